@@ -1,0 +1,41 @@
+// The mesh between import and the base structure: plain arrays in world space.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <string>
+#include <vector>
+
+namespace lsp {
+
+struct Material {
+  std::string name;
+  glm::vec3 base_color{0.8f};  // linear, the factor without textures
+  float opacity = 1.0f;
+  glm::vec3 emission{0.0f};  // linear radiance
+  float roughness = 1.0f;
+  float metallic = 0.0f;
+};
+
+// Why triangles of the input are not in the mesh. No triangle is dropped for any other reason.
+struct Rejected {
+  uint64_t degenerate = 0;    // two equal corners, or area below 1e-14 of the longest edge squared
+  uint64_t non_finite = 0;    // a corner at infinity or NaN
+  uint64_t out_of_range = 0;  // an index beyond the vertices
+  uint64_t total() const { return degenerate + non_finite + out_of_range; }
+};
+
+struct Mesh {
+  std::vector<glm::vec3> positions;                    // world space, welded where the input shares them
+  std::vector<glm::uvec3> triangles;                   // indices into positions, all in range
+  std::vector<uint32_t> primitives;                    // per triangle: number in import order
+  std::vector<std::array<glm::vec3, 3>> normals;       // per triangle and corner, unit length
+  std::vector<uint32_t> material_ids;                  // per triangle, index into materials
+  std::vector<Material> materials;                     // never empty
+  uint64_t primitive_count = 0;                        // triangles in import order, rejected ones included
+  Rejected rejected;                                   // triangles.size() + rejected.total() = primitive_count
+  std::vector<std::string> notes;                      // what was skipped or assumed, for the report
+};
+
+}  // namespace lsp

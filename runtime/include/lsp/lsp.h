@@ -1,0 +1,111 @@
+/* liblsp: open an .lsp file and trace rays against it.
+ *
+ * The library allocates nothing while it opens or traces, starts no threads, throws nothing and keeps no
+ * global state. Every function may be called from any thread; a scene is read-only after lsp_open.
+ *
+ * The bytes of a file may be hostile. lsp_open checks everything that it and the tracer rely on to stay
+ * inside the bytes given; lsp_trace checks every index that it follows and bounds its loops by the header's
+ * declared limits, so that a damaged file gives wrong hits at worst. Use lsp-validate to know that a file is
+ * good.
+ */
+#ifndef LSP_LSP_H
+#define LSP_LSP_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "lsp/layout.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef enum lsp_status {
+  LSP_OK = 0,
+  LSP_ERROR_FILE = 2,        /* the file cannot be read */
+  LSP_ERROR_INVALID = 3,     /* the bytes are not a valid .lsp file */
+  LSP_ERROR_UNSUPPORTED = 5, /* a version, feature or section this library does not know, or a packed file */
+  LSP_ERROR_LIMIT = 6,       /* a limit was exceeded: a buffer given is too small, a range too large */
+} lsp_status;
+
+typedef struct lsp_error {
+  lsp_status status;
+  uint64_t offset;   /* byte offset in the file of what is wrong, 0 where there is none */
+  char message[192]; /* what is wrong and what to do, zero-terminated */
+} lsp_error;
+
+/* ---- files ---------------------------------------------------------------------------------------------- */
+
+/* A file mapped read-only. `bytes` is page-aligned. */
+typedef struct lsp_mapping {
+  const void* bytes;
+  uint64_t size;
+} lsp_mapping;
+
+/* Maps the file at `path`. On success the caller owns the mapping and ends it with lsp_unmap_file. `error`
+ * may be NULL here and everywhere below. */
+lsp_status lsp_map_file(const char* path, lsp_mapping* mapping, lsp_error* error);
+void lsp_unmap_file(lsp_mapping* mapping);
+
+/* ---- scenes --------------------------------------------------------------------------------------------- */
+
+/* A view of an open file: pointers into the caller's bytes, nothing owned. Arrays that the file does not
+ * have, or that were not asked for, are NULL with a count of 0 in the header's sense. */
+typedef struct lsp_scene {
+  const void* bytes;
+  uint64_t size;
+  const LspHeader* header;
+  const LspSection* sections; /* header->section_count of them */
+  const LspNode* nodes;
+  const LspTriangle* triangles;
+  const LspCornerNormals* normals;
+  const LspMaterial* materials;
+  const LspLineSpace* line_spaces;
+  const LspBitWord* bit_words;
+  const uint32_t* candidates;
+} lsp_scene;
+
+/* Opens the raw (not packed) file in bytes[0, size). `bytes` must be 16-byte aligned and outlive `scene`.
+ * Touches the header, the section table and nothing else: the cost does not depend on the file's size, and
+ * hashes are not computed (lsp-validate does). A packed file is LSP_ERROR_UNSUPPORTED: unpack it first. */
+lsp_status lsp_open(const void* bytes, uint64_t size, lsp_scene* scene, lsp_error* error);
+
+/* Size of the raw form of the packed or raw file in bytes[0, size), in bytes. */
+lsp_status lsp_unpacked_size(const void* bytes, uint64_t size, uint64_t* unpacked, lsp_error* error);
+
+/* Writes the raw form of the file into `out`, which must hold exactly lsp_unpacked_size bytes. zstd allocates
+ * its working memory here; this is the only function of the library that allocates. */
+lsp_status lsp_unpack(const void* bytes, uint64_t size, void* out, uint64_t out_size, lsp_error* error);
+
+/* ---- tracing on the CPU --------------------------------------------------------------------------------- */
+
+/* lsp_trace_options.flags */
+#define LSP_TRACE_APPROXIMATE 0x1u      /* stop at Line Spaces; without it: exact, down to triangles */
+#define LSP_TRACE_ANY_HIT 0x2u          /* any hit in (tmin, tmax), not the closest */
+#define LSP_TRACE_NEAR_APPROXIMATE 0x4u /* answer from a Line Space even where the origin lies inside it */
+
+typedef struct lsp_trace_options {
+  uint32_t flags; /* LSP_TRACE_* */
+  float lod; /* theta: stop at a Line Space once its box's diagonal is under lod * distance; 0: deepest only */
+} lsp_trace_options;
+
+/* Sums over the rays traced. Counting costs a few per cent; pass NULL for speed. */
+typedef struct lsp_trace_counts {
+  uint64_t rays;
+  uint64_t invalid; /* rays with a non-finite component, a zero direction or tmin > tmax: misses */
+  uint64_t hits;
+  uint64_t nodes;     /* LspNode visited (two boxes each) */
+  uint64_t shafts;    /* Line Space look-ups */
+  uint64_t triangles; /* triangles tested exactly */
+} lsp_trace_counts;
+
+/* Traces rays[0, count) into hits[0, count), in this thread. Adds to *counts unless it is NULL.
+ * LSP_ERROR_UNSUPPORTED when the file lacks what the options need (no Line Spaces, no exact tree). */
+lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options* options, const LspRay* rays,
+                     LspHit* hits, uint64_t count, lsp_trace_counts* counts, lsp_error* error);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* LSP_LSP_H */
