@@ -1,0 +1,70 @@
+#!/usr/bin/env bash
+# Installs what is missing, builds, runs every test, and says what passed, failed and was skipped.
+#
+#   ./tests/run.sh [--no-asan] [--jobs N]
+#
+# Exit 0 only if everything built and every test that could run passed.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+with_asan=1
+jobs=$(nproc)
+while [ $# -gt 0 ]; do
+  case "$1" in
+    --no-asan) with_asan=0 ;;
+    --jobs) jobs=$2; shift ;;
+    --help) sed -n '2,6s/^# \{0,1\}//p' "$0"; exit 0 ;;
+    *) echo "run.sh: unknown option $1, see --help" >&2; exit 1 ;;
+  esac
+  shift
+done
+
+started=$SECONDS
+./samples/setup.sh
+
+# ccache makes the second run short; without it everything still builds.
+launcher=()
+if command -v ccache >/dev/null; then
+  launcher=(-DCMAKE_C_COMPILER_LAUNCHER=ccache -DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
+fi
+
+summary=()
+failed=0
+
+# run_preset PRESET BUILD_TARGETS... -- CTEST_ARGUMENTS...
+run_preset() {
+  local preset=$1 targets=() log count
+  shift
+  while [ "$1" != -- ]; do targets+=("$1"); shift; done
+  shift
+  echo "== $preset: configure and build"
+  cmake --preset "$preset" "${launcher[@]}"
+  cmake --build --preset "$preset" -j "$jobs" ${targets[@]+--target "${targets[@]}"}
+  echo "== $preset: test"
+  log="build/$preset/tests.log"
+  if ! ctest --preset "$preset" -j "$jobs" "$@" 2>&1 | tee "$log"; then failed=1; fi
+  count=$(grep -cE '^ *[0-9]+/[0-9]+ Test +#' "$log" || true)
+  if [ "$count" -eq 0 ]; then
+    echo "run.sh: $preset: no test ran" >&2
+    failed=1
+  fi
+  summary+=("$preset: $count tests, $(grep -cE '\*\*\*Skipped' "$log" || true) skipped," \
+            "$(grep -cE '\*\*\*(Failed|Timeout|Not Run|Exception)|Subprocess aborted' "$log" || true) failed")
+  while IFS= read -r line; do summary+=("    skipped: $line"); done < <(
+    sed -nE 's/^ *[0-9]+\/[0-9]+ Test +#[0-9]+: ([^ ]+) .*\*\*\*Skipped.*/\1/p' "$log")
+}
+
+run_preset release --
+if [ "$with_asan" = 1 ]; then
+  # Everything that reads untrusted bytes, once more under the address and undefined-behaviour sanitizers.
+  run_preset asan parser_tests -- -L parser
+fi
+
+echo
+echo "== summary after $(((SECONDS - started) / 60)) min $(((SECONDS - started) % 60)) s"
+printf '%s\n' "${summary[@]}"
+if [ "$failed" != 0 ]; then
+  echo "FAILED"
+  exit 4
+fi
+echo "all passed"
