@@ -47,6 +47,9 @@ typedef struct lsp_mapping {
 lsp_status lsp_map_file(const char* path, lsp_mapping* mapping, lsp_error* error);
 void lsp_unmap_file(lsp_mapping* mapping);
 
+/* Sections a file may have at most; lsp_open compares each with all others. */
+#define LSP_MAX_SECTIONS 256u
+
 /* ---- scenes --------------------------------------------------------------------------------------------- */
 
 /* A view of an open file: pointers into the caller's bytes, nothing owned. Arrays that the file does not
@@ -70,11 +73,20 @@ typedef struct lsp_scene {
  * hashes are not computed (lsp-validate does). A packed file is LSP_ERROR_UNSUPPORTED: unpack it first. */
 lsp_status lsp_open(const void* bytes, uint64_t size, lsp_scene* scene, lsp_error* error);
 
-/* Size of the raw form of the packed or raw file in bytes[0, size), in bytes. */
+/* Raw and packed form. header.alignment states the alignment of the raw form, in packed files too. A file with
+ * any compressed section is packed: its sections start at multiples of 256 and its length is padded to 256. In
+ * the raw form that lsp_unpack writes, the sections follow the table in its order, each at the next multiple of
+ * header.alignment, and the length is padded to it; everything between is zero. Content hash and features are
+ * the same in both, header_hash is recomputed. Packing a raw file of that layout and unpacking it gives the
+ * same bytes again. */
+
+/* Size of the raw form of the packed or raw file in bytes[0, size), in bytes. `bytes` must be 16-byte aligned
+ * and may be hostile: a size that its stored bytes cannot hold is refused, but bound what you allocate. */
 lsp_status lsp_unpacked_size(const void* bytes, uint64_t size, uint64_t* unpacked, lsp_error* error);
 
-/* Writes the raw form of the file into `out`, which must hold exactly lsp_unpacked_size bytes. zstd allocates
- * its working memory here; this is the only function of the library that allocates. */
+/* Writes the raw form of the file into `out`, 16-byte aligned, exactly lsp_unpacked_size bytes, not overlapping
+ * `bytes`. Header, table and every section are checked against their hashes. After an error `out` holds nothing
+ * of use. zstd allocates its working memory here; this is the only function of the library that allocates. */
 lsp_status lsp_unpack(const void* bytes, uint64_t size, void* out, uint64_t out_size, lsp_error* error);
 
 /* ---- tracing on the CPU --------------------------------------------------------------------------------- */

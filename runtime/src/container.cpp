@@ -1,0 +1,274 @@
+#include "container.h"
+
+#include <bit>
+#include <cmath>
+#include <cstddef>
+
+#include "error.h"
+
+// The structs of layout.h are read in place.
+static_assert(std::endian::native == std::endian::little);
+
+namespace lsp {
+namespace {
+
+// What the format says about the sections of this version.
+struct KnownType {
+  uint32_t type;
+  uint32_t element_bytes;
+};
+constexpr KnownType kKnown[kKnownSectionCount] = {
+    {LSP_SECTION_NODE, sizeof(LspNode)},          {LSP_SECTION_TRIA, sizeof(LspTriangle)},
+    {LSP_SECTION_NRML, sizeof(LspCornerNormals)}, {LSP_SECTION_MATL, sizeof(LspMaterial)},
+    {LSP_SECTION_LSPC, sizeof(LspLineSpace)},     {LSP_SECTION_BITS, sizeof(LspBitWord)},
+    {LSP_SECTION_CAND, sizeof(uint32_t)},         {LSP_SECTION_META, 1},
+};
+
+constexpr uint64_t kPackedAlignment = 256;
+constexpr uint32_t kMaxAlignment = 65536;
+constexpr uint32_t kMaxReferences = 1u << 30;  // a traversal marks references in their two highest bits
+
+int known_index(uint32_t type) {
+  for (int i = 0; i < kKnownSectionCount; ++i) {
+    if (kKnown[i].type == type) return i;
+  }
+  return -1;
+}
+
+bool finite(const lsp_float3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+
+// Identification: is this a file that this version can read at all?
+lsp_status check_identity(const LspHeader& header, lsp_error* error) {
+  if (header.magic_0 != LSP_MAGIC_0 || header.magic_1 != LSP_MAGIC_1) {
+    return fail(error, LSP_ERROR_INVALID, 0, "is not an .lsp file (its first eight bytes are others)");
+  }
+  if (header.version_major != LSP_VERSION_MAJOR) {
+    return fail(error, LSP_ERROR_UNSUPPORTED, offsetof(LspHeader, version_major),
+                "has format version %u.%u, this library reads %u.x; bake it again", header.version_major,
+                header.version_minor, LSP_VERSION_MAJOR);
+  }
+  if (const uint32_t unknown = header.required_features & ~LSP_FEATURES_KNOWN; unknown != 0) {
+    return fail(error, LSP_ERROR_UNSUPPORTED, offsetof(LspHeader, required_features),
+                "needs features that this library does not know (bits 0x%X); update the library", unknown);
+  }
+  if (header.header_bytes != sizeof(LspHeader)) {
+    return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, header_bytes),
+                "states a header of %u bytes, not %zu", header.header_bytes, sizeof(LspHeader));
+  }
+  return LSP_OK;
+}
+
+lsp_status check_limits(const LspHeader& header, lsp_error* error) {
+  if (!std::has_single_bit(header.alignment) || header.alignment < kPackedAlignment ||
+      header.alignment > kMaxAlignment) {
+    return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, alignment),
+                "states an alignment of %u, not 256, 4096 or 65536", header.alignment);
+  }
+  const bool ntree = (header.required_features & LSP_FEATURE_NTREE) != 0;
+  if (header.base_structure != (ntree ? LSP_BASE_NTREE : LSP_BASE_BVH)) {
+    return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, base_structure),
+                "states base structure %u, which its features contradict", header.base_structure);
+  }
+  if (!finite(header.bounds_min) || !finite(header.bounds_max) || !std::isfinite(header.normal_angle_cos) ||
+      !std::isfinite(header.plane_tolerance)) {
+    return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, bounds_min),
+                "has bounds or tolerances that are not finite");
+  }
+  if (header.max_stack > LSP_MAX_STACK) {
+    return fail(error, LSP_ERROR_LIMIT, offsetof(LspHeader, max_stack),
+                "needs a stack of %u entries, the limit is %u", header.max_stack, LSP_MAX_STACK);
+  }
+  if (header.max_leaf_triangles > LSP_MAX_LEAF_TRIANGLES) {
+    return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, max_leaf_triangles),
+                "states leaves of %u triangles, the limit is %u", header.max_leaf_triangles,
+                LSP_MAX_LEAF_TRIANGLES);
+  }
+  if (header.node_count > kMaxReferences || header.line_space_count > kMaxReferences ||
+      header.triangle_count > LSP_LEAF_FIRST_MASK + 1u) {
+    return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, node_count),
+                "states more nodes, triangles or Line Spaces than a reference can name");
+  }
+  return LSP_OK;
+}
+
+lsp_status check_root(const LspHeader& header, lsp_error* error) {
+  const uint32_t root = header.root;
+  bool good = root == LSP_NONE;
+  if (root != LSP_NONE && (root & LSP_LEAF_BIT) == 0) good = root < header.node_count;
+  if (root != LSP_NONE && (root & LSP_LEAF_BIT) != 0) {
+    const uint32_t count = ((root >> LSP_LEAF_COUNT_SHIFT) & LSP_LEAF_COUNT_MASK) + 1;
+    good = in_range(root & LSP_LEAF_FIRST_MASK, count, header.triangle_count);
+  }
+  if (!good) {
+    return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, root),
+                "its root 0x%08X names no node and no leaf", root);
+  }
+  const uint32_t line_space = header.root_line_space;
+  if (line_space != LSP_NONE && (line_space & LSP_LINE_SPACE_MASK) >= header.line_space_count) {
+    return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, root_line_space),
+                "its root's Line Space 0x%08X is not in the file", line_space);
+  }
+  return LSP_OK;
+}
+
+// One entry of the table by itself: does it lie in the file, may it be ignored, do its sizes agree?
+lsp_status check_section(const LspHeader& header, const LspSection& section, uint64_t table_end, uint64_t at,
+                         lsp_error* error) {
+  const SectionName name(section.type);
+  const int known = known_index(section.type);
+  if (known < 0 && (section.flags & LSP_SECTION_REQUIRED) != 0) {
+    return fail(error, LSP_ERROR_UNSUPPORTED, at,
+                "needs section \"%s\" (0x%08X), which this library does not know; update the library",
+                name.text, section.type);
+  }
+  if (section.offset < table_end || !in_range(section.offset, section.stored_bytes, header.file_bytes)) {
+    return fail(error, LSP_ERROR_INVALID, at, "section %s does not lie inside the file", name.text);
+  }
+  if (section.codec == LSP_CODEC_NONE && section.bytes != section.stored_bytes) {
+    return fail(error, LSP_ERROR_INVALID, at, "section %s is not compressed, yet its two sizes differ",
+                name.text);
+  }
+  uint64_t bytes = 0;
+  if (__builtin_mul_overflow(section.element_count, uint64_t{section.element_bytes}, &bytes) ||
+      bytes != section.bytes) {
+    return fail(error, LSP_ERROR_INVALID, at, "section %s: its elements do not add up to its size",
+                name.text);
+  }
+  if (known < 0) return LSP_OK;
+  if (section.element_bytes != kKnown[known].element_bytes) {
+    return fail(error, LSP_ERROR_INVALID, at, "section %s has elements of %u bytes, not %u", name.text,
+                section.element_bytes, kKnown[known].element_bytes);
+  }
+  if (section.codec != LSP_CODEC_NONE && section.codec != LSP_CODEC_ZSTD) {
+    return fail(error, LSP_ERROR_UNSUPPORTED, at, "section %s is packed with codec %u, which is not known",
+                name.text, section.codec);
+  }
+  return LSP_OK;
+}
+
+// The table as a whole: starts aligned, no type twice, no two sections over each other.
+lsp_status check_table(const LspHeader& header, const LspSection* sections, bool packed, lsp_error* error) {
+  const uint64_t alignment = packed ? kPackedAlignment : header.alignment;
+  if (header.file_bytes % alignment != 0) {
+    return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, file_bytes),
+                "its length is not a multiple of %llu", static_cast<unsigned long long>(alignment));
+  }
+  for (uint32_t i = 0; i < header.section_count; ++i) {
+    const LspSection& a = sections[i];
+    const uint64_t at = header.section_table_offset + uint64_t{i} * sizeof(LspSection);
+    const SectionName name(a.type);
+    if (a.offset % alignment != 0) {
+      return fail(error, LSP_ERROR_INVALID, at, "section %s does not start at a multiple of %llu", name.text,
+                  static_cast<unsigned long long>(alignment));
+    }
+    for (uint32_t j = 0; j < i; ++j) {
+      const LspSection& b = sections[j];
+      if (a.type == b.type) {
+        return fail(error, LSP_ERROR_INVALID, at, "section %s is there twice", name.text);
+      }
+      if (a.stored_bytes != 0 && b.stored_bytes != 0 && a.offset < b.offset + b.stored_bytes &&
+          b.offset < a.offset + a.stored_bytes) {
+        return fail(error, LSP_ERROR_INVALID, at, "section %s overlaps section %s", name.text,
+                    SectionName(b.type).text);
+      }
+    }
+  }
+  return LSP_OK;
+}
+
+// Header against table: the counts agree, and what the features promise is there.
+lsp_status check_contents(const Container& container, lsp_error* error) {
+  const LspHeader& header = *container.header;
+  const uint32_t features = header.required_features;
+  const struct {
+    KnownSection section;
+    uint32_t count;
+    uint32_t feature;  // the bit that stands for the section, 0: none
+  } expected[] = {
+      {kNode, header.node_count, 0},
+      {kTria, header.triangle_count, 0},
+      {kNrml, (features & LSP_FEATURE_NORMALS) != 0 ? header.triangle_count : 0, LSP_FEATURE_NORMALS},
+      {kMatl, header.material_count, LSP_FEATURE_MATERIALS},
+      {kLspc, header.line_space_count, LSP_FEATURE_LINE_SPACES},
+      {kBits, header.bit_word_count, 0},
+      {kCand, header.candidate_word_count, 0},
+  };
+  for (const auto& e : expected) {
+    const LspSection* section = container.known[e.section];
+    const SectionName name(kKnown[e.section].type);
+    const uint64_t present = section == nullptr ? 0 : section->element_count;
+    if (present != e.count) {
+      return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, node_count),
+                  "section %s has %llu elements, the header states %u", name.text,
+                  static_cast<unsigned long long>(present), e.count);
+    }
+    if (e.feature != 0 && e.count != 0 && (features & e.feature) == 0) {
+      return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, required_features),
+                  "has section %s, but not the feature bit for it", name.text);
+    }
+  }
+  return LSP_OK;
+}
+
+}  // namespace
+
+SectionName::SectionName(uint32_t type) noexcept : text{} {
+  for (int i = 0; i < 4; ++i) {
+    const char c = static_cast<char>((type >> (8 * i)) & 0xFF);
+    text[i] = c > ' ' && c <= '~' ? c : '?';
+  }
+}
+
+lsp_status read_container(const void* bytes, uint64_t size, Container* container, lsp_error* error) noexcept {
+  *container = {};
+  if (bytes == nullptr || reinterpret_cast<uintptr_t>(bytes) % 16 != 0) {
+    return fail(error, LSP_ERROR_INVALID, 0, "its bytes must be in memory at a multiple of 16");
+  }
+  if (size < sizeof(LspHeader)) {
+    return fail(error, LSP_ERROR_INVALID, size, "is %llu bytes long, shorter than a header",
+                static_cast<unsigned long long>(size));
+  }
+  const LspHeader& header = *static_cast<const LspHeader*>(bytes);
+  if (const lsp_status status = check_identity(header, error); status != LSP_OK) return status;
+  if (header.file_bytes != size) {
+    return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, file_bytes),
+                "is %llu bytes long, its header states %llu; it was %s",
+                static_cast<unsigned long long>(size), static_cast<unsigned long long>(header.file_bytes),
+                size < header.file_bytes ? "cut" : "extended");
+  }
+  if (header.section_count > LSP_MAX_SECTIONS) {
+    return fail(error, LSP_ERROR_LIMIT, offsetof(LspHeader, section_count),
+                "has %u sections, the limit is %u", header.section_count, LSP_MAX_SECTIONS);
+  }
+  const uint64_t table_bytes = uint64_t{header.section_count} * sizeof(LspSection);
+  if (header.section_table_offset != sizeof(LspHeader) ||
+      !in_range(header.section_table_offset, table_bytes, size)) {
+    return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, section_table_offset),
+                "its section table of %u entries is not inside the file behind the header",
+                header.section_count);
+  }
+  if (const lsp_status status = check_limits(header, error); status != LSP_OK) return status;
+
+  const auto* sections = reinterpret_cast<const LspSection*>(static_cast<const unsigned char*>(bytes) +
+                                                             header.section_table_offset);
+  bool packed = false;
+  const LspSection* known[kKnownSectionCount] = {};
+  for (uint32_t i = 0; i < header.section_count; ++i) {
+    const uint64_t at = header.section_table_offset + uint64_t{i} * sizeof(LspSection);
+    const lsp_status status =
+        check_section(header, sections[i], header.section_table_offset + table_bytes, at, error);
+    if (status != LSP_OK) return status;
+    packed = packed || sections[i].codec != LSP_CODEC_NONE;
+    if (const int index = known_index(sections[i].type); index >= 0) known[index] = &sections[i];
+  }
+  if (const lsp_status status = check_table(header, sections, packed, error); status != LSP_OK) return status;
+
+  container->header = &header;
+  container->sections = sections;
+  for (int i = 0; i < kKnownSectionCount; ++i) container->known[i] = known[i];
+  container->packed = packed;
+  if (const lsp_status status = check_contents(*container, error); status != LSP_OK) return status;
+  return check_root(header, error);
+}
+
+}  // namespace lsp

@@ -1,0 +1,38 @@
+#include "container.h"
+#include "error.h"
+
+namespace {
+
+template <class T>
+const T* array(const void* bytes, const LspSection* section) {
+  if (section == nullptr || section->element_count == 0) return nullptr;
+  return reinterpret_cast<const T*>(static_cast<const unsigned char*>(bytes) + section->offset);
+}
+
+}  // namespace
+
+extern "C" lsp_status lsp_open(const void* bytes, uint64_t size, lsp_scene* scene, lsp_error* error) {
+  *scene = {};
+  lsp::Container container;
+  const lsp_status status = lsp::read_container(bytes, size, &container, error);
+  if (status != LSP_OK) return status;
+  for (const LspSection* section : container.known) {
+    if (section != nullptr && section->codec != LSP_CODEC_NONE) {
+      return lsp::fail(error, LSP_ERROR_UNSUPPORTED, section->offset,
+                       "section %s is compressed; unpack the file first (lsp_unpack)",
+                       lsp::SectionName(section->type).text);
+    }
+  }
+  scene->bytes = bytes;
+  scene->size = size;
+  scene->header = container.header;
+  scene->sections = container.sections;
+  scene->nodes = array<LspNode>(bytes, container.known[lsp::kNode]);
+  scene->triangles = array<LspTriangle>(bytes, container.known[lsp::kTria]);
+  scene->normals = array<LspCornerNormals>(bytes, container.known[lsp::kNrml]);
+  scene->materials = array<LspMaterial>(bytes, container.known[lsp::kMatl]);
+  scene->line_spaces = array<LspLineSpace>(bytes, container.known[lsp::kLspc]);
+  scene->bit_words = array<LspBitWord>(bytes, container.known[lsp::kBits]);
+  scene->candidates = array<uint32_t>(bytes, container.known[lsp::kCand]);
+  return lsp::succeed(error);
+}
