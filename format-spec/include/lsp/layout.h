@@ -205,6 +205,11 @@ LSP_END(LspMaterial)
  *
  *   ((in * 5 + (out > in ? out - 1 : out)) * N^2 + patch_in) * N^2 + patch_out        in, out: faces
  */
+#define LSP_SHAFT_INDEX(in_face, out_face, patch_in, patch_out, n)                                        \
+  ((((in_face)*5u + ((out_face) > (in_face) ? (out_face)-1u : (out_face))) * ((n) * (n)) + (patch_in)) * \
+       ((n) * (n)) +                                                                                      \
+   (patch_out))
+
 LSP_BEGIN(LspLineSpace)
   LSP_VEC3 lo; /* box of the shafts: the node's, with an outward margin */
   LSP_UINT word_first; /* first LspBitWord */

@@ -1,0 +1,472 @@
+/* Exact and approximate traversal of an .lsp scene, in the common subset of GLSL 4.6 and C++20.
+ *
+ * lsp.glsl includes this file in shaders, runtime/src/trace.cpp in the library: one text, so that both give
+ * the same bits. That holds where the compiler contracts nothing (LSP_PRECISE, -ffp-contract=off), rounds
+ * division and square root correctly, and evaluates what stands here: min and max are written out because
+ * their answers to NaN are not the same everywhere.
+ *
+ * Sources. Triangles: Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection", JCGT 2013. Boxes: Ize,
+ * "Robust BVH Ray Traversal", JCGT 2013. Line Spaces: Keul, Koss, Mueller, "Fast Indirect Lighting
+ * Approximations using the Representative Candidate Line Space", 2018, section 3.1, algorithms 1 and 2.
+ *
+ * Rounding, u = 2^-24. A direction is scaled by a power of two (exact) until its largest component is in
+ * [1, 4). With R the largest distance along an axis from the origin to a side of the scene's box:
+ *   - a slab plane (lo - o) * inv is off by 3 u R along the axis at most (one subtraction, the reciprocal,
+ *     one product);
+ *   - a corner in the triangle's ray space is off by 5 u R (translation, shear quotient, product, difference);
+ *   - the sign of an edge function of two such corners is never wrong, only lost to zero: products round
+ *     monotonically. Zero counts as inside, so a ray through an edge or corner hits one of the neighbours.
+ * A box is therefore grown by err = 16 u R + 4 u max|o| on every side, which covers both, and the rounding of
+ * o + err itself: no box is missed whose triangle would be hit, however thin the box is.
+ */
+#ifndef LSP_TRAVERSE_H
+#define LSP_TRAVERSE_H
+
+#define LSP_TRACE_APPROXIMATE_BIT 0x1u
+#define LSP_TRACE_ANY_HIT_BIT 0x2u
+#define LSP_TRACE_NEAR_APPROXIMATE_BIT 0x4u
+
+/* Set in LspHit.flags when a traversal ended with work left: the device cut a loop short (some give a vector
+ * of invocations a budget of iterations), and the answer is not to be trusted. */
+#define LSP_HIT_INCOMPLETE 0x80000000u
+
+/* On the stack a reference to a Line Space is its index with bit 30 set; bit 31 is a leaf's. */
+#define LSP_STACK_LINE_SPACE_BIT 0x40000000u
+
+#define LSP_INFINITY uintBitsToFloat(0x7F800000u)
+#define LSP_FLOAT_MAX uintBitsToFloat(0x7F7FFFFFu)
+
+struct LspCounts {
+  uint nodes;
+  uint shafts;
+  uint triangles;
+};
+
+#ifdef LSP_COUNT
+#define LSP_COUNT_ADD(field, n) counts.field += (n)
+#else
+#define LSP_COUNT_ADD(field, n)
+#endif
+
+/* A ray made ready: t is in lengths of `direction`, which is the given one times 2^-exponent. */
+struct LspSetup {
+  vec3 origin;
+  vec3 direction;
+  vec3 inverse;      /* 1 / direction; +-2^80 for components too small to matter */
+  vec3 origin_plus;  /* origin + err: boxes are grown by moving the origin */
+  vec3 origin_minus; /* origin - err */
+  vec3 shear;        /* of the triangle test, in the order of `axis` */
+  float speed;       /* length of direction */
+  float tmin;
+  float tmax;
+  float to_scaled; /* t (scaled) = t (given) * to_scaled */
+  float to_given;
+  int axis; /* of the largest component of direction */
+};
+
+/* A hit in the making: the triangle record, its t (scaled) and the weights of corners 1 and 2. */
+struct LspBest {
+  float t;
+  float u;
+  float v;
+  uint triangle; /* record, LSP_NONE: none */
+  uint flags;    /* LSP_HIT_* */
+  bool complete; /* the traversal ran to its end */
+};
+
+LSP_FN float lsp_min(float a, float b) { return b < a ? b : a; }
+LSP_FN float lsp_max(float a, float b) { return a < b ? b : a; }
+
+LSP_FN float lsp_dot(vec3 a, vec3 b) {
+  LSP_PRECISE float r = a.x * b.x + a.y * b.y + a.z * b.z;
+  return r;
+}
+
+LSP_FN vec3 lsp_cross(vec3 a, vec3 b) {
+  LSP_PRECISE vec3 r = vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
+  return r;
+}
+
+LSP_FN bool lsp_is_nan(float x) { return (floatBitsToUint(x) & 0x7FFFFFFFu) > 0x7F800000u; }
+LSP_FN bool lsp_is_finite(float x) { return (floatBitsToUint(x) & 0x7F800000u) != 0x7F800000u; }
+LSP_FN bool lsp_all_finite(vec3 v) { return lsp_is_finite(v.x) && lsp_is_finite(v.y) && lsp_is_finite(v.z); }
+
+/* |d| under 2^-60 of the largest component cannot move a ray by an ulp of the scene: its slab is either hit
+ * along its whole length or missed, and a finite reciprocal keeps 0 * infinity out of the arithmetic. */
+LSP_FN float lsp_reciprocal(float d) {
+  bool tiny = abs(d) < 8.6736174e-19f;
+  LSP_PRECISE float r = 1.0f / (tiny ? 1.0f : d);
+  float huge = (floatBitsToUint(d) & 0x80000000u) != 0u ? -1.2089258e24f : 1.2089258e24f;
+  return tiny ? huge : r;
+}
+
+/* Rotates the axes so that `axis` comes last; keeps their cyclic order. */
+LSP_FN vec3 lsp_rotate(vec3 v, int axis) {
+  return axis == 2 ? v : (axis == 0 ? vec3(v.y, v.z, v.x) : vec3(v.z, v.x, v.y));
+}
+
+/* False: an invalid ray (a NaN anywhere, a non-finite origin or direction, a direction of zero or of
+ * denormal length, tmin > tmax); `s` is then not set. */
+LSP_FN bool lsp_setup(LSP_SCENE_ LspRay ray, LSP_OUT(LspSetup) s) {
+  vec3 o = LSP_LOAD3(ray.origin);
+  vec3 d = LSP_LOAD3(ray.direction);
+  if (!lsp_all_finite(o) || !lsp_all_finite(d)) return false;
+  if (lsp_is_nan(ray.tmin) || lsp_is_nan(ray.tmax) || ray.tmin > ray.tmax) return false;
+  vec3 m = abs(d);
+  int axis = m.x >= m.y ? (m.x >= m.z ? 0 : 2) : (m.y >= m.z ? 1 : 2);
+  float largest = lsp_max(lsp_max(m.x, m.y), m.z);
+  uint exponent = floatBitsToUint(largest) >> 23u;
+  if (exponent == 0u) return false;
+  exponent = exponent > 253u ? 253u : exponent;
+  float shrink = uintBitsToFloat((254u - exponent) << 23u); /* 2^(127 - exponent) */
+  s.to_given = shrink;
+  s.to_scaled = uintBitsToFloat(exponent << 23u); /* 2^(exponent - 127) */
+  s.axis = axis;
+  s.origin = o;
+  s.direction = vec3(d.x * shrink, d.y * shrink, d.z * shrink);
+  s.inverse = vec3(lsp_reciprocal(s.direction.x), lsp_reciprocal(s.direction.y), lsp_reciprocal(s.direction.z));
+  s.tmin = ray.tmin * s.to_scaled;
+  s.tmax = lsp_min(lsp_min(ray.tmax, LSP_FLOAT_MAX) * s.to_scaled, LSP_FLOAT_MAX);
+
+  vec3 lo = abs(LSP_LOAD3(LSP_HEADER.bounds_min) - o);
+  vec3 hi = abs(LSP_LOAD3(LSP_HEADER.bounds_max) - o);
+  float r = lsp_max(lsp_max(lsp_max(lo.x, hi.x), lsp_max(lo.y, hi.y)), lsp_max(lo.z, hi.z));
+  float a = lsp_max(lsp_max(abs(o.x), abs(o.y)), abs(o.z));
+  LSP_PRECISE float err = r * 9.5367432e-7f + a * 2.3841858e-7f; /* 16 u r + 4 u a */
+  s.origin_plus = vec3(o.x + err, o.y + err, o.z + err);
+  s.origin_minus = vec3(o.x - err, o.y - err, o.z - err);
+
+  vec3 p = lsp_rotate(s.direction, axis);
+  LSP_PRECISE float z = 1.0f / p.z;
+  LSP_PRECISE vec3 shear = vec3(p.x / p.z, p.y / p.z, z);
+  s.shear = shear;
+  LSP_PRECISE float len = sqrt(lsp_dot(s.direction, s.direction));
+  s.speed = len;
+  return true;
+}
+
+/* Where the ray enters the grown box, not before tmin; infinity when it misses. tmax is finite. */
+LSP_FN float lsp_box(LSP_IN(LspSetup) s, vec3 lo, vec3 hi, float tmax) {
+  LSP_PRECISE vec3 a = (lo - s.origin_plus) * s.inverse;
+  LSP_PRECISE vec3 b = (hi - s.origin_minus) * s.inverse;
+  float t_in = lsp_max(lsp_max(lsp_min(a.x, b.x), lsp_min(a.y, b.y)), lsp_max(lsp_min(a.z, b.z), s.tmin));
+  float t_out = lsp_min(lsp_min(lsp_max(a.x, b.x), lsp_max(a.y, b.y)), lsp_min(lsp_max(a.z, b.z), tmax));
+  return t_in <= t_out ? t_in : LSP_INFINITY;
+}
+
+/* Watertight triangle test (Woop et al. 2013). Keeps a hit nearer than best.t and beyond tmin. */
+LSP_FN void lsp_triangle(LSP_SCENE_ LSP_IN(LspSetup) s, uint index, LSP_INOUT(LspBest) best) {
+  LspTriangle tri = LSP_TRIANGLE(index);
+  vec3 a = lsp_rotate(LSP_LOAD3(tri.v0) - s.origin, s.axis);
+  vec3 b = lsp_rotate(LSP_LOAD3(tri.v1) - s.origin, s.axis);
+  vec3 c = lsp_rotate(LSP_LOAD3(tri.v2) - s.origin, s.axis);
+  LSP_PRECISE float ax = a.x - s.shear.x * a.z;
+  LSP_PRECISE float ay = a.y - s.shear.y * a.z;
+  LSP_PRECISE float bx = b.x - s.shear.x * b.z;
+  LSP_PRECISE float by = b.y - s.shear.y * b.z;
+  LSP_PRECISE float cx = c.x - s.shear.x * c.z;
+  LSP_PRECISE float cy = c.y - s.shear.y * c.z;
+  LSP_PRECISE float u = cx * by - cy * bx;
+  LSP_PRECISE float v = ax * cy - ay * cx;
+  LSP_PRECISE float w = bx * ay - by * ax;
+  if ((u < 0.0f || v < 0.0f || w < 0.0f) && (u > 0.0f || v > 0.0f || w > 0.0f)) return;
+  LSP_PRECISE float det = u + v + w;
+  if (det == 0.0f) return;
+  LSP_PRECISE float rcp = 1.0f / det;
+  LSP_PRECISE float t = (u * a.z + v * b.z + w * c.z) * s.shear.z * rcp;
+  if (t > s.tmin && t < best.t) {
+    best.t = t;
+    best.u = v * rcp;
+    best.v = w * rcp;
+    best.triangle = index;
+    best.flags = 0u;
+  }
+}
+
+/* Octahedral unit vector of two 16-bit snorm (Cigolle et al. 2014). */
+LSP_FN vec3 lsp_unpack_normal(uint packed) {
+  float x = float(int(packed << 16u) >> 16) * (1.0f / 32767.0f);
+  float y = float(int(packed) >> 16) * (1.0f / 32767.0f);
+  LSP_PRECISE float z = 1.0f - abs(x) - abs(y);
+  float fold = lsp_max(-z, 0.0f);
+  LSP_PRECISE vec3 n = vec3(x + (x >= 0.0f ? -fold : fold), y + (y >= 0.0f ? -fold : fold), z);
+  LSP_PRECISE float r = 1.0f / sqrt(lsp_dot(n, n));
+  LSP_PRECISE vec3 unit = n * r;
+  return unit;
+}
+
+/* Normal of a point of a triangle's plane by its weights, not normalised. */
+LSP_FN vec3 lsp_interpolated_normal(LSP_SCENE_ uint index, float u, float v) {
+  LspCornerNormals c = LSP_NORMALS(index);
+  vec3 n0 = lsp_unpack_normal(c.n0);
+  vec3 n1 = lsp_unpack_normal(c.n1);
+  vec3 n2 = lsp_unpack_normal(c.n2);
+  LSP_PRECISE vec3 n = n0 * (1.0f - u - v) + n1 * u + n2 * v;
+  return n;
+}
+
+/* The paper's edge criterion: does the extrapolated normal leave the cone about the triangle's mean normal? */
+LSP_FN bool lsp_leaves_cone(LSP_SCENE_ uint index, float u, float v) {
+  vec3 n = lsp_interpolated_normal(LSP_SCENE_ARG_ index, u, v);
+  vec3 mean = lsp_interpolated_normal(LSP_SCENE_ARG_ index, 0.33333334f, 0.33333334f);
+  LSP_PRECISE float d = lsp_dot(n, mean);
+  LSP_PRECISE float limit = LSP_HEADER.normal_angle_cos * sqrt(lsp_dot(n, n) * lsp_dot(mean, mean));
+  return d < limit;
+}
+
+/* Where the ray passes the box of a Line Space, and which shaft it takes. The shaft is in range for any ray;
+ * a ray that misses the box has t_in > t_out. Entry and exit face are never the same one: on one axis they
+ * are its two sides. */
+struct LspPassage {
+  float t_in;
+  float t_out;
+  uint shaft;
+};
+
+LSP_FN uint lsp_patch(vec3 point, vec3 lo, vec3 scale, int axis, uint resolution) {
+  LSP_PRECISE vec3 q = (point - lo) * scale;
+  float top = float(resolution) - 0.5f;
+  float u = axis == 0 ? q.y : q.x;
+  float v = axis == 2 ? q.y : q.z;
+  u = u > 0.0f ? u : 0.0f;
+  v = v > 0.0f ? v : 0.0f;
+  u = u < top ? u : top;
+  v = v < top ? v : top;
+  return uint(u) + resolution * uint(v);
+}
+
+LSP_FN LspPassage lsp_pass(LSP_IN(LspSetup) s, LSP_IN(LspLineSpace) ls) {
+  vec3 lo = LSP_LOAD3(ls.lo);
+  vec3 scale = LSP_LOAD3(ls.scale);
+  LSP_PRECISE vec3 a = (lo - s.origin) * s.inverse;
+  LSP_PRECISE vec3 b = (LSP_LOAD3(ls.hi) - s.origin) * s.inverse;
+  vec3 near = vec3(lsp_min(a.x, b.x), lsp_min(a.y, b.y), lsp_min(a.z, b.z));
+  vec3 far = vec3(lsp_max(a.x, b.x), lsp_max(a.y, b.y), lsp_max(a.z, b.z));
+  LspPassage p;
+  int axis_in = near.x >= near.y ? (near.x >= near.z ? 0 : 2) : (near.y >= near.z ? 1 : 2);
+  int axis_out = far.x <= far.y ? (far.x <= far.z ? 0 : 2) : (far.y <= far.z ? 1 : 2);
+  p.t_in = lsp_max(lsp_max(near.x, near.y), near.z);
+  p.t_out = lsp_min(lsp_min(far.x, far.y), far.z);
+  LSP_PRECISE vec3 point_in = s.origin + s.direction * p.t_in;
+  LSP_PRECISE vec3 point_out = s.origin + s.direction * p.t_out;
+  float sign_in = axis_in == 0 ? s.inverse.x : (axis_in == 1 ? s.inverse.y : s.inverse.z);
+  float sign_out = axis_out == 0 ? s.inverse.x : (axis_out == 1 ? s.inverse.y : s.inverse.z);
+  uint face_in = 2u * uint(axis_in) + (sign_in < 0.0f ? 1u : 0u);
+  uint face_out = 2u * uint(axis_out) + (sign_out < 0.0f ? 0u : 1u);
+  uint n = ls.format & LSP_FORMAT_RESOLUTION_MASK;
+  uint patch_in = lsp_patch(point_in, lo, scale, axis_in, n);
+  uint patch_out = lsp_patch(point_out, lo, scale, axis_out, n);
+  p.shaft = LSP_SHAFT_INDEX(face_in, face_out, patch_in, patch_out, n);
+  return p;
+}
+
+/* The paper's algorithm 2: the candidate triangle record of a shaft, LSP_NONE when the shaft is empty. */
+LSP_FN uint lsp_candidate(LSP_SCENE_ LSP_IN(LspLineSpace) ls, uint shaft) {
+  uint entry;
+  if ((ls.format & LSP_FORMAT_DENSE) != 0u) {
+    entry = shaft;
+  } else {
+    LspBitWord word = LSP_BIT_WORD(ls.word_first + (shaft >> 5u));
+    uint bit = shaft & 31u;
+    if (((word.bits >> bit) & 1u) == 0u) return LSP_NONE;
+    entry = word.offset + uint(bitCount(word.bits & ((1u << bit) - 1u)));
+  }
+  uint bytes = (ls.format >> LSP_FORMAT_ENTRY_SHIFT) & LSP_FORMAT_ENTRY_MASK;
+  uint local;
+  if (bytes == 1u) {
+    local = (LSP_CANDIDATE(ls.candidate_first + (entry >> 2u)) >> ((entry & 3u) * 8u)) & 0xFFu;
+    local = local == 0xFFu && (ls.format & LSP_FORMAT_DENSE) != 0u ? LSP_NONE : local;
+  } else if (bytes == 2u) {
+    local = (LSP_CANDIDATE(ls.candidate_first + (entry >> 1u)) >> ((entry & 1u) * 16u)) & 0xFFFFu;
+    local = local == 0xFFFFu && (ls.format & LSP_FORMAT_DENSE) != 0u ? LSP_NONE : local;
+  } else {
+    local = LSP_CANDIDATE(ls.candidate_first + entry);
+  }
+  return local == LSP_NONE ? LSP_NONE : ls.triangle_first + local;
+}
+
+/* The paper's algorithm 1: answers the ray from the Line Space, the candidate taken as an infinite plane.
+ * A plane hit outside the box by less than the tolerance is moved to the box. */
+LSP_FN void lsp_look_up(LSP_SCENE_ LSP_IN(LspSetup) s, uint index, LSP_INOUT(LspBest) best) {
+  LspLineSpace ls = LSP_LINE_SPACE(index);
+  LspPassage pass = lsp_pass(s, ls);
+  if (pass.t_in > pass.t_out || pass.t_in >= best.t) return;
+  uint candidate = lsp_candidate(LSP_SCENE_ARG_ ls, pass.shaft);
+  if (candidate == LSP_NONE) return;
+  LspTriangle tri = LSP_TRIANGLE(candidate);
+  vec3 v0 = LSP_LOAD3(tri.v0);
+  vec3 e1 = LSP_LOAD3(tri.v1) - v0;
+  vec3 e2 = LSP_LOAD3(tri.v2) - v0;
+  vec3 n = lsp_cross(e1, e2);
+  vec3 w = v0 - s.origin;
+  LSP_PRECISE float t = lsp_dot(w, n) / lsp_dot(s.direction, n); /* NaN or infinite along the plane */
+  vec3 extent = LSP_LOAD3(ls.hi) - LSP_LOAD3(ls.lo);
+  LSP_PRECISE float slack = LSP_HEADER.plane_tolerance * sqrt(lsp_dot(extent, extent)) / s.speed;
+  if (!(t >= pass.t_in - slack && t <= pass.t_out + slack)) return;
+  t = t < pass.t_in ? pass.t_in : t;
+  t = t > pass.t_out ? pass.t_out : t;
+  if (!(t > s.tmin && t < best.t)) return;
+  /* Weights of the point in the plane, by the triangle's own area vector. */
+  LSP_PRECISE vec3 r = s.direction * t - w;
+  LSP_PRECISE float scale = 1.0f / lsp_dot(n, n);
+  LSP_PRECISE float u = lsp_dot(lsp_cross(r, e2), n) * scale;
+  LSP_PRECISE float v = lsp_dot(lsp_cross(e1, r), n) * scale;
+  if ((tri.flags & LSP_TRIANGLE_SMOOTH) != 0u && LSP_HEADER.normal_angle_cos > -1.0f && LSP_HAS_NORMALS &&
+      lsp_leaves_cone(LSP_SCENE_ARG_ candidate, u, v))
+    return;
+  best.t = t;
+  best.u = u;
+  best.v = v;
+  best.triangle = candidate;
+  best.flags = LSP_HIT_LINE_SPACE | (pass.t_in <= s.tmin ? LSP_HIT_ORIGIN_INSIDE : 0u);
+}
+
+/* What to visit for a child hit at t_in: itself, or in an approximate trace its Line Space. */
+LSP_FN uint lsp_visit(LSP_IN(LspSetup) s, uint flags, float lod, uint child, uint line_space, vec3 lo,
+                      vec3 hi, float t_in) {
+  if (line_space == LSP_NONE || (flags & LSP_TRACE_APPROXIMATE_BIT) == 0u) return child;
+  bool exists = child != LSP_NONE;
+  if (t_in <= s.tmin && (flags & LSP_TRACE_NEAR_APPROXIMATE_BIT) == 0u && exists) return child;
+  if ((line_space & LSP_TERMINAL_BIT) == 0u && exists) {
+    vec3 extent = hi - lo;
+    LSP_PRECISE float reach = lod * t_in * s.speed;
+    if (!(lsp_dot(extent, extent) < reach * reach)) return child;
+  }
+  return (line_space & LSP_LINE_SPACE_MASK) | LSP_STACK_LINE_SPACE_BIT;
+}
+
+/* Traces from the child reference `root` (with its Line Space reference). flags: LSP_TRACE_*_BIT. */
+LSP_FN LspBest lsp_traverse(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod, uint root,
+                            uint root_line_space LSP_COUNTS_PARAM) {
+  LspBest best;
+  best.t = s.tmax;
+  best.u = 0.0f;
+  best.v = 0.0f;
+  best.triangle = LSP_NONE;
+  best.flags = 0u;
+
+  uint stack_ref[LSP_STACK_SIZE];
+  float stack_t[LSP_STACK_SIZE];
+  uint top = 0u;
+  bool any_hit = (flags & LSP_TRACE_ANY_HIT_BIT) != 0u;
+
+  vec3 root_lo = LSP_LOAD3(LSP_HEADER.bounds_min);
+  vec3 root_hi = LSP_LOAD3(LSP_HEADER.bounds_max);
+  float root_t = lsp_box(s, root_lo, root_hi, best.t);
+  uint ref = LSP_NONE;
+  if (root_t <= best.t) ref = lsp_visit(s, flags, lod, root, root_line_space, root_lo, root_hi, root_t);
+
+  bool done = ref == LSP_NONE;
+  for (uint step = 0u; !done && step < LSP_HEADER.max_steps; ++step) {
+    bool pop = true;
+    if ((ref & LSP_LEAF_BIT) != 0u) {
+      uint first = ref & LSP_LEAF_FIRST_MASK;
+      uint count = ((ref >> LSP_LEAF_COUNT_SHIFT) & LSP_LEAF_COUNT_MASK) + 1u;
+      LSP_COUNT_ADD(triangles, count);
+      for (uint i = 0u; i < count; ++i) lsp_triangle(LSP_SCENE_ARG_ s, first + i, best);
+    } else if ((ref & LSP_STACK_LINE_SPACE_BIT) != 0u) {
+      LSP_COUNT_ADD(shafts, 1u);
+      lsp_look_up(LSP_SCENE_ARG_ s, ref & ~LSP_STACK_LINE_SPACE_BIT, best);
+    } else {
+      LSP_COUNT_ADD(nodes, 1u);
+      LspNode node = LSP_NODE(ref);
+      vec3 lo0 = LSP_LOAD3(node.lo0);
+      vec3 hi0 = LSP_LOAD3(node.hi0);
+      vec3 lo1 = LSP_LOAD3(node.lo1);
+      vec3 hi1 = LSP_LOAD3(node.hi1);
+      float t0 = lsp_box(s, lo0, hi0, best.t);
+      float t1 = lsp_box(s, lo1, hi1, best.t);
+      uint ref0 = LSP_NONE;
+      uint ref1 = LSP_NONE;
+      if (t0 <= best.t) ref0 = lsp_visit(s, flags, lod, node.child0, node.line_space0, lo0, hi0, t0);
+      if (t1 <= best.t) ref1 = lsp_visit(s, flags, lod, node.child1, node.line_space1, lo1, hi1, t1);
+      if (ref0 != LSP_NONE && ref1 != LSP_NONE) {
+        if (top >= LSP_STACK_SIZE) break;
+        /* Any hit: the builder put the child of larger area first, where a hit is likeliest. */
+        if (any_hit || t0 <= t1) {
+          stack_ref[top] = ref1;
+          stack_t[top] = t1;
+          ref = ref0;
+        } else {
+          stack_ref[top] = ref0;
+          stack_t[top] = t0;
+          ref = ref1;
+        }
+        ++top;
+        pop = false;
+      } else if (ref0 != LSP_NONE) {
+        ref = ref0;
+        pop = false;
+      } else if (ref1 != LSP_NONE) {
+        ref = ref1;
+        pop = false;
+      }
+    }
+    if (pop) {
+      if (any_hit && best.triangle != LSP_NONE) {
+        done = true;
+      } else {
+        ref = LSP_NONE;
+        while (top > 0u && ref == LSP_NONE) {
+          --top;
+          if (stack_t[top] <= best.t) ref = stack_ref[top];
+        }
+        done = ref == LSP_NONE;
+      }
+    }
+  }
+  best.complete = done;
+  return best;
+}
+
+LSP_FN LspHit lsp_no_hit() {
+  LspHit hit;
+  hit.t = LSP_INFINITY;
+  hit.primitive = LSP_NONE;
+  hit.u = 0.0f;
+  hit.v = 0.0f;
+  hit.normal = LSP_STORE3(vec3(0.0f, 0.0f, 0.0f));
+  hit.flags = 0u;
+  return hit;
+}
+
+/* The answer in the caller's terms: t in lengths of the direction given, unit shading normal. */
+LSP_FN LspHit lsp_finish(LSP_SCENE_ LSP_IN(LspSetup) s, LspRay ray, LSP_IN(LspBest) best) {
+  LspHit hit = lsp_no_hit();
+  if (!best.complete) hit.flags = LSP_HIT_INCOMPLETE;
+  if (best.triangle == LSP_NONE) return hit;
+  float t = best.t * s.to_given;
+  if (!(t > ray.tmin && t < ray.tmax)) return hit;
+  LspTriangle tri = LSP_TRIANGLE(best.triangle);
+  vec3 v0 = LSP_LOAD3(tri.v0);
+  vec3 n = lsp_cross(LSP_LOAD3(tri.v1) - v0, LSP_LOAD3(tri.v2) - v0);
+  if (LSP_HAS_NORMALS) {
+    vec3 smooth_n = lsp_interpolated_normal(LSP_SCENE_ARG_ best.triangle, best.u, best.v);
+    if (lsp_dot(smooth_n, smooth_n) > 1e-12f) n = smooth_n;
+  }
+  /* Scaled by a power of two first: the area vector of a small triangle squared would underflow. */
+  vec3 m = abs(n);
+  uint exponent = floatBitsToUint(lsp_max(lsp_max(m.x, m.y), m.z)) >> 23u;
+  exponent = exponent < 1u ? 1u : (exponent > 253u ? 253u : exponent);
+  n = n * uintBitsToFloat((254u - exponent) << 23u);
+  LSP_PRECISE float r = 1.0f / sqrt(lsp_dot(n, n));
+  LSP_PRECISE vec3 unit = n * r;
+  hit.t = t;
+  hit.primitive = tri.primitive;
+  hit.u = best.u;
+  hit.v = best.v;
+  hit.normal = LSP_STORE3(unit);
+  hit.flags |= best.flags;
+  return hit;
+}
+
+/* Traces one ray from the root. lod: see lsp_trace_options. valid is false for an invalid ray, a miss. */
+LSP_FN LspHit lsp_trace_ray(LSP_SCENE_ LspRay ray, uint flags, float lod, LSP_OUT(bool) valid LSP_COUNTS_PARAM) {
+  LspSetup s;
+  valid = lsp_setup(LSP_SCENE_ARG_ ray, s);
+  if (!valid) return lsp_no_hit();
+  LspBest best = lsp_traverse(LSP_SCENE_ARG_ s, flags, lod, LSP_HEADER.root, LSP_HEADER.root_line_space LSP_COUNTS_ARG);
+  return lsp_finish(LSP_SCENE_ARG_ s, ray, best);
+}
+
+#endif
