@@ -33,7 +33,7 @@ failed=0
 
 # run_preset PRESET BUILD_TARGETS... -- CTEST_ARGUMENTS...
 run_preset() {
-  local preset=$1 targets=() log count
+  local preset=$1 targets=() log count skipped broken
   shift
   while [ "$1" != -- ]; do targets+=("$1"); shift; done
   shift
@@ -48,8 +48,9 @@ run_preset() {
     echo "run.sh: $preset: no test ran" >&2
     failed=1
   fi
-  summary+=("$preset: $count tests, $(grep -cE '\*\*\*Skipped' "$log" || true) skipped," \
-            "$(grep -cE '\*\*\*(Failed|Timeout|Not Run|Exception)|Subprocess aborted' "$log" || true) failed")
+  skipped=$(grep -cE '\*\*\*Skipped' "$log" || true)
+  broken=$(grep -cE '\*\*\*(Failed|Timeout|Not Run|Exception)|Subprocess aborted' "$log" || true)
+  summary+=("$preset: $count tests, $skipped skipped, $broken failed")
   while IFS= read -r line; do summary+=("    skipped: $line"); done < <(
     sed -nE 's/^ *[0-9]+\/[0-9]+ Test +#[0-9]+: ([^ ]+) .*\*\*\*Skipped.*/\1/p' "$log")
 }

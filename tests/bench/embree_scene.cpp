@@ -1,0 +1,241 @@
+#include "embree_scene.h"
+
+#include <atomic>
+#include <chrono>
+#include <cstring>
+#include <string>
+#if defined(__SSE__)
+#include <pmmintrin.h>
+#include <xmmintrin.h>
+#endif
+
+#include "lsp/program.h"
+
+namespace lsp::bench {
+namespace {
+
+// Embree's manual asks for both modes; without them incoherent rays meet denormals and slow down.
+class FlushDenormals {
+ public:
+#if defined(__SSE__)
+  FlushDenormals() : saved_(_mm_getcsr()) {
+    _MM_SET_FLUSH_ZERO_MODE(_MM_FLUSH_ZERO_ON);
+    _MM_SET_DENORMALS_ZERO_MODE(_MM_DENORMALS_ZERO_ON);
+  }
+  ~FlushDenormals() { _mm_setcsr(saved_); }
+
+ private:
+  unsigned saved_;
+#endif
+};
+
+bool add_allocated(void* user, ssize_t bytes, bool) {
+  std::atomic_ref(*static_cast<int64_t*>(user)).fetch_add(bytes);
+  return true;
+}
+
+[[noreturn]] void fail(RTCDevice device) {
+  throw Failure(Exit::kInternal, "",
+                "Embree refuses: error " + std::to_string(static_cast<int>(rtcGetDeviceError(device))));
+}
+
+// Written as three 16-byte pieces, as the ray arrives: component-wise stores cost Embree a tenth of its
+// speed to stalled store forwarding, and the comparison has to be fair.
+struct alignas(16) Four {
+  float x[4];
+};
+struct alignas(16) FourWords {
+  uint32_t x[4];
+};
+
+void fill(RTCRay& out, const LspRay& ray) {
+  Four piece;
+  std::memcpy(&piece, &ray.origin, 16);
+  std::memcpy(&out.org_x, &piece, 16);
+  std::memcpy(&piece, &ray.direction, 16);
+  const float tmax = piece.x[3];
+  piece.x[3] = 0;  // Embree's time
+  std::memcpy(&out.dir_x, &piece, 16);
+  FourWords rest{{0, 0xFFFFFFFFu, 0, 0}};  // tfar, mask, id, flags
+  std::memcpy(&rest.x[0], &tmax, 4);
+  std::memcpy(&out.tfar, &rest, 16);
+}
+
+template <typename Packet>
+void fill_lane(Packet& out, size_t lane, const LspRay& ray) {
+  out.org_x[lane] = ray.origin.x;
+  out.org_y[lane] = ray.origin.y;
+  out.org_z[lane] = ray.origin.z;
+  out.tnear[lane] = ray.tmin;
+  out.dir_x[lane] = ray.direction.x;
+  out.dir_y[lane] = ray.direction.y;
+  out.dir_z[lane] = ray.direction.z;
+  out.time[lane] = 0;
+  out.tfar[lane] = ray.tmax;
+  out.mask[lane] = 0xFFFFFFFFu;
+  out.id[lane] = 0;
+  out.flags[lane] = 0;
+}
+
+LspHit occlusion(float tfar) {
+  const bool hit = tfar == -INFINITY;  // how Embree says "occluded"
+  LspHit out{};
+  out.t = hit ? 0.0f : INFINITY;
+  out.primitive = hit ? 0 : LSP_NONE;
+  return out;
+}
+
+template <typename Packet, size_t kWidth, typename Call>
+void any_packets(std::span<const LspRay> rays, std::span<LspHit> hits, Call call) {
+  for (size_t i = 0; i < rays.size(); i += kWidth) {
+    Packet packet;
+    alignas(64) int valid[kWidth];
+    const size_t count = std::min(kWidth, rays.size() - i);
+    for (size_t k = 0; k < kWidth; ++k) {
+      valid[k] = k < count ? -1 : 0;
+      fill_lane(packet, k, rays[i + (k < count ? k : 0)]);
+    }
+    call(valid, &packet);
+    for (size_t k = 0; k < count; ++k) hits[i + k] = occlusion(packet.tfar[k]);
+  }
+}
+
+template <typename Packet, size_t kWidth, typename Call>
+void closest_packets(std::span<const LspRay> rays, std::span<LspHit> hits,
+                     const std::vector<uint32_t>& primitives, Call call) {
+  for (size_t i = 0; i < rays.size(); i += kWidth) {
+    Packet packet;
+    alignas(64) int valid[kWidth];
+    const size_t count = std::min(kWidth, rays.size() - i);
+    for (size_t k = 0; k < kWidth; ++k) {
+      valid[k] = k < count ? -1 : 0;
+      fill_lane(packet.ray, k, rays[i + (k < count ? k : 0)]);
+      packet.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
+      packet.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
+    }
+    call(valid, &packet);
+    for (size_t k = 0; k < count; ++k) {
+      LspHit hit{INFINITY, LSP_NONE, 0, 0, {0, 0, 0}, 0};
+      if (packet.hit.geomID[k] != RTC_INVALID_GEOMETRY_ID) {
+        hit.t = packet.ray.tfar[k];
+        hit.primitive = primitives[packet.hit.primID[k]];
+        hit.u = packet.hit.u[k];
+        hit.v = packet.hit.v[k];
+      }
+      hits[i + k] = hit;
+    }
+  }
+}
+
+LspHit to_hit(const RTCRayHit& query, const std::vector<uint32_t>& primitives) {
+  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {INFINITY, LSP_NONE, 0, 0, {0, 0, 0}, 0};
+  return {query.ray.tfar, primitives[query.hit.primID], query.hit.u, query.hit.v, {0, 0, 0}, 0};
+}
+
+constexpr size_t kStreamRays = 1024;
+
+}  // namespace
+
+const char* EmbreeScene::version() { return RTC_VERSION_STRING; }
+
+EmbreeScene::EmbreeScene(const Soup& soup, EmbreeMode mode, unsigned threads)
+    : allocated_(std::make_unique<int64_t>(0)) {
+  const std::string config = threads ? "threads=" + std::to_string(threads) : "";
+  device_.reset(rtcNewDevice(config.c_str()));
+  if (!device_) fail(nullptr);
+  rtcSetDeviceMemoryMonitorFunction(device_.get(), add_allocated, allocated_.get());
+  scene_.reset(rtcNewScene(device_.get()));
+  rtcSetSceneFlags(scene_.get(), mode == EmbreeMode::kRobust ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE);
+  rtcSetSceneBuildQuality(scene_.get(), RTC_BUILD_QUALITY_HIGH);
+
+  RTCGeometry geometry = rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE);
+  if (soup.size() > 0) {
+    auto* vertices = static_cast<glm::vec3*>(
+        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, 3 * soup.size()));
+    auto* indices = static_cast<uint32_t*>(
+        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, soup.size()));
+    if (!vertices || !indices) fail(device_.get());
+    for (size_t i = 0; i < soup.size(); ++i) {
+      for (size_t k = 0; k < 3; ++k) vertices[3 * i + k] = soup.corners[i][k];
+    }
+    for (uint32_t i = 0; i < 3 * soup.size(); ++i) indices[i] = i;
+  }
+  rtcCommitGeometry(geometry);
+  rtcAttachGeometry(scene_.get(), geometry);
+  rtcReleaseGeometry(geometry);
+  const auto start = std::chrono::steady_clock::now();
+  rtcCommitScene(scene_.get());
+  build_seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (rtcGetDeviceError(device_.get()) != RTC_ERROR_NONE) fail(device_.get());
+  bytes_ = static_cast<uint64_t>(*allocated_);
+  primitives_ = soup.primitives;
+}
+
+void EmbreeScene::closest(std::span<const LspRay> rays, std::span<LspHit> hits, EmbreeCall call) const {
+  const FlushDenormals flush;
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  RTCScene scene = scene_.get();
+  if (call == EmbreeCall::kPacket8) {
+    closest_packets<RTCRayHit8, 8>(rays, hits, primitives_, [&](const int* valid, RTCRayHit8* packet) {
+      rtcIntersect8(valid, scene, &context, packet);
+    });
+  } else if (call == EmbreeCall::kPacket16) {
+    closest_packets<RTCRayHit16, 16>(rays, hits, primitives_, [&](const int* valid, RTCRayHit16* packet) {
+      rtcIntersect16(valid, scene, &context, packet);
+    });
+  } else if (call == EmbreeCall::kStream) {
+    auto queries = std::make_unique<RTCRayHit[]>(kStreamRays);
+    for (size_t i = 0; i < rays.size(); i += kStreamRays) {
+      const size_t count = std::min(kStreamRays, rays.size() - i);
+      for (size_t k = 0; k < count; ++k) {
+        fill(queries[k].ray, rays[i + k]);
+        queries[k].hit.geomID = RTC_INVALID_GEOMETRY_ID;
+        queries[k].hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+      }
+      rtcIntersect1M(scene, &context, queries.get(), static_cast<unsigned>(count), sizeof(RTCRayHit));
+      for (size_t k = 0; k < count; ++k) hits[i + k] = to_hit(queries[k], primitives_);
+    }
+  } else {
+    RTCRayHit query;
+    for (size_t i = 0; i < rays.size(); ++i) {
+      fill(query.ray, rays[i]);
+      query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+      query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+      rtcIntersect1(scene, &context, &query);
+      hits[i] = to_hit(query, primitives_);
+    }
+  }
+}
+
+void EmbreeScene::any(std::span<const LspRay> rays, std::span<LspHit> hits, EmbreeCall call) const {
+  const FlushDenormals flush;
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  RTCScene scene = scene_.get();
+  if (call == EmbreeCall::kPacket8) {
+    any_packets<RTCRay8, 8>(
+        rays, hits, [&](const int* valid, RTCRay8* packet) { rtcOccluded8(valid, scene, &context, packet); });
+  } else if (call == EmbreeCall::kPacket16) {
+    any_packets<RTCRay16, 16>(rays, hits, [&](const int* valid, RTCRay16* packet) {
+      rtcOccluded16(valid, scene, &context, packet);
+    });
+  } else if (call == EmbreeCall::kStream) {
+    auto queries = std::make_unique<RTCRay[]>(kStreamRays);
+    for (size_t i = 0; i < rays.size(); i += kStreamRays) {
+      const size_t count = std::min(kStreamRays, rays.size() - i);
+      for (size_t k = 0; k < count; ++k) fill(queries[k], rays[i + k]);
+      rtcOccluded1M(scene, &context, queries.get(), static_cast<unsigned>(count), sizeof(RTCRay));
+      for (size_t k = 0; k < count; ++k) hits[i + k] = occlusion(queries[k].tfar);
+    }
+  } else {
+    RTCRay query;
+    for (size_t i = 0; i < rays.size(); ++i) {
+      fill(query, rays[i]);
+      rtcOccluded1(scene, &context, &query);
+      hits[i] = occlusion(query.tfar);
+    }
+  }
+}
+
+}  // namespace lsp::bench

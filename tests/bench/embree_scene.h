@@ -1,0 +1,51 @@
+// Embree over the same triangles: the independent ground truth, and the peer to beat.
+#pragma once
+
+#include <embree3/rtcore.h>
+
+#include <memory>
+#include <span>
+
+#include "soup.h"
+
+namespace lsp::bench {
+
+enum class EmbreeMode { kRobust, kFast };
+
+// Which of Embree's entry points answers: one ray a call, packets of 8 or 16, or streams of 1024.
+enum class EmbreeCall { kSingle, kPacket8, kPacket16, kStream };
+
+// An Embree scene whose primitive numbers are import numbers. Tracing is thread-safe.
+class EmbreeScene {
+ public:
+  // `threads` bounds the build's threads only; 0: all. Throws Failure(kInternal) with Embree's own words.
+  explicit EmbreeScene(const Soup& soup, EmbreeMode mode = EmbreeMode::kRobust, unsigned threads = 0);
+
+  // Closest hits of rays[i] into hits[i] (t, primitive, u, v; the normal is left zero), in this thread, with
+  // denormals flushed to zero during the call as Embree asks for.
+  void closest(std::span<const LspRay> rays, std::span<LspHit> hits,
+               EmbreeCall call = EmbreeCall::kSingle) const;
+
+  // Whether rays[i] hits anything: hits[i].primitive is 0 or LSP_NONE, t is 0 or infinity.
+  void any(std::span<const LspRay> rays, std::span<LspHit> hits, EmbreeCall call = EmbreeCall::kSingle) const;
+
+  double build_seconds() const { return build_seconds_; }
+  uint64_t bytes() const { return bytes_; }  // what Embree allocated, the copied triangles included
+  static const char* version();              // "3.13.5"
+
+ private:
+  struct ReleaseDevice {
+    void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
+  };
+  struct ReleaseScene {
+    void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
+  };
+  std::unique_ptr<int64_t> allocated_;  // outlives the device, whose monitor adds to it
+  std::unique_ptr<std::remove_pointer_t<RTCDevice>, ReleaseDevice> device_;
+  std::unique_ptr<std::remove_pointer_t<RTCScene>, ReleaseScene> scene_;
+  std::vector<uint32_t> primitives_;  // Embree's number to import number
+  double build_seconds_ = 0;
+  uint64_t bytes_ = 0;
+};
+
+}  // namespace lsp::bench
