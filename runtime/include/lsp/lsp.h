@@ -96,6 +96,10 @@ lsp_status lsp_unpack(const void* bytes, uint64_t size, void* out, uint64_t out_
 #define LSP_TRACE_ANY_HIT 0x2u          /* any hit in (tmin, tmax), not the closest */
 #define LSP_TRACE_NEAR_APPROXIMATE 0x4u /* answer from a Line Space even where the origin lies inside it */
 
+/* LspHit.flags: the traversal ended with work left, the answer is not to be trusted. In the library this only
+ * happens to files whose declared bounds are wrong; on a device also where it cuts long loops short. */
+#define LSP_HIT_INCOMPLETE 0x80000000u
+
 typedef struct lsp_trace_options {
   uint32_t flags; /* LSP_TRACE_* */
   float lod; /* theta: stop at a Line Space once its box's diagonal is under lod * distance; 0: deepest only */

@@ -1,0 +1,189 @@
+/* liblsp on Vulkan: what an engine needs to put an open scene on its device and to trace there.
+ *
+ * The engine owns everything of Vulkan: instance, device, queue, memory, buffers, command buffers. The
+ * library (lsp_vulkan) says which buffers to make and what goes where, and records copies and dispatches into
+ * the engine's command buffers through function pointers the engine gives it. It loads no Vulkan loader,
+ * creates no object, allocates nothing, waits for nothing and keeps no state.
+ *
+ *   lsp_scene --plan--> buffers (one a section) --+-- import: the mapping itself, each buffer at its file
+ * offset
+ *                                                 +-- upload: copies straight from the mapping, in pieces
+ *
+ * Shaders: include lsp/lsp.glsl in your own and bind the scene's buffers to bindings 0 to 6; or use the ready
+ * trace shader here, which reads rays from a buffer and writes hits to another.
+ *
+ * Files that lsp-validate has not passed: switch robustBufferAccess on. lsp_open has checked the file's
+ * frame, not the indices inside its sections, and the shader does not check them again.
+ */
+#ifndef LSP_LSP_VULKAN_H
+#define LSP_LSP_VULKAN_H
+
+#include <vulkan/vulkan_core.h>
+
+#include "lsp/lsp.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ---- which buffers --------------------------------------------------------------------------------------
+ */
+
+/* What the scene is wanted for; a section that nothing asks for gets no buffer and is never read. */
+#define LSP_USE_EXACT 0x1u       /* exact traces: NODE, TRIA, NRML */
+#define LSP_USE_APPROXIMATE 0x2u /* approximate traces: NODE, TRIA, NRML, LSPC, BITS, CAND */
+#define LSP_USE_MATERIALS 0x4u   /* MATL, for the engine's own shaders */
+
+/* Bindings of the trace shader's descriptor set, all storage buffers; 0 to 6 are those of lsp.glsl. */
+typedef enum lsp_vulkan_binding {
+  LSP_BINDING_HEADER = 0,
+  LSP_BINDING_NODES = 1,
+  LSP_BINDING_TRIANGLES = 2,
+  LSP_BINDING_NORMALS = 3,
+  LSP_BINDING_LINE_SPACES = 4,
+  LSP_BINDING_BIT_WORDS = 5,
+  LSP_BINDING_CANDIDATES = 6,
+  LSP_BINDING_RAYS = 7,     /* LspRay, read */
+  LSP_BINDING_HITS = 8,     /* LspHit, written */
+  LSP_BINDING_COUNTERS = 9, /* lsp_trace_counts, added to; only the counting shader uses it */
+  LSP_BINDING_COUNT = 10,
+  LSP_BINDING_NONE = 10 /* of MATL's buffer, which the trace shader does not read */
+} lsp_vulkan_binding;
+
+#define LSP_VULKAN_MAX_BUFFERS 8u
+
+/* What the library has to know of the device. */
+typedef struct lsp_vulkan_limits {
+  uint64_t max_storage_buffer_range; /* VkPhysicalDeviceLimits::maxStorageBufferRange */
+  uint64_t import_alignment; /* minImportedHostPointerAlignment; 0 without VK_EXT_external_memory_host */
+  uint32_t max_group_count;  /* VkPhysicalDeviceLimits::maxComputeWorkGroupCount[0] */
+} lsp_vulkan_limits;
+
+/* One buffer of the scene: file bytes [file_offset, file_offset + bytes) as they are. */
+typedef struct lsp_vulkan_buffer {
+  uint32_t binding; /* lsp_vulkan_binding */
+  uint32_t section; /* LSP_SECTION_*, 0: the header */
+  uint64_t file_offset;
+  uint64_t bytes; /* size of the buffer */
+} lsp_vulkan_buffer;
+
+/* The buffers to make, in the order of their bindings; buffers[0] is the header's. */
+typedef struct lsp_vulkan_plan {
+  uint32_t buffer_count;
+  lsp_vulkan_buffer buffers[LSP_VULKAN_MAX_BUFFERS];
+  uint64_t bytes; /* of all buffers together */
+} lsp_vulkan_plan;
+
+/* Usage of every buffer of the plan. An imported one can do without the transfer bit. */
+#define LSP_VULKAN_BUFFER_USAGE (VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT)
+
+/* Plans the buffers of an open scene for `uses` (LSP_USE_*). LSP_ERROR_UNSUPPORTED when the file lacks what
+ * is asked for; LSP_ERROR_LIMIT when a section is larger than a storage buffer of the device may be. */
+lsp_status lsp_vulkan_plan_buffers(const lsp_scene* scene, uint32_t uses, const lsp_vulkan_limits* limits,
+                                   lsp_vulkan_plan* plan, lsp_error* error);
+
+/* ---- import: no copy ------------------------------------------------------------------------------------
+ */
+
+/* LSP_OK when address and size of the scene's bytes meet the device's alignment for importing host memory
+ * (VK_EXT_external_memory_host), else LSP_ERROR_UNSUPPORTED and the reason. The engine then allocates memory
+ * of scene->size bytes with VkImportMemoryHostPointerInfoEXT on scene->bytes, handle type HOST_ALLOCATION,
+ * and binds each buffer (created with VkExternalMemoryBufferCreateInfo) at its file_offset. It has to check
+ * for itself that the handle type is importable (vkGetPhysicalDeviceExternalBufferProperties), that a memory
+ * type fits both pointer and buffers, and that file_offset meets the buffer's alignment; and to upload
+ * instead whenever any step fails, a lost device at the first submit included. On a discrete device every
+ * read would cross the bus: upload there. Free the memory before the mapping ends; no shader may write to it.
+ */
+lsp_status lsp_vulkan_check_import(const lsp_scene* scene, const lsp_vulkan_limits* limits, lsp_error* error);
+
+/* ---- upload: one copy -----------------------------------------------------------------------------------
+ */
+
+/* A piece of the upload: `bytes` bytes at `source` go to offset `buffer_offset` of plan->buffers[buffer]. */
+typedef struct lsp_vulkan_copy {
+  uint32_t buffer;
+  uint64_t buffer_offset;
+  const void* source;
+  uint64_t bytes;
+} lsp_vulkan_copy;
+
+/* The piece after *cursor (0 at first, then left alone), at most max_bytes long; 0 when there is none left.
+ * Pieces of 1 MiB keep a cold mapping fast. Copy it to mapped device-local memory, or to a staging buffer and
+ * record the transfer with lsp_vulkan_record_copy. */
+int lsp_vulkan_next_copy(const lsp_scene* scene, const lsp_vulkan_plan* plan, uint64_t max_bytes,
+                         uint64_t* cursor, lsp_vulkan_copy* copy);
+
+/* ---- recording ------------------------------------------------------------------------------------------
+ */
+
+/* The functions the library calls, of the engine's device. */
+typedef struct lsp_vulkan_functions {
+  PFN_vkCmdCopyBuffer cmd_copy_buffer;
+  PFN_vkCmdPipelineBarrier cmd_pipeline_barrier;
+  PFN_vkCmdBindPipeline cmd_bind_pipeline;
+  PFN_vkCmdBindDescriptorSets cmd_bind_descriptor_sets;
+  PFN_vkCmdPushConstants cmd_push_constants;
+  PFN_vkCmdDispatch cmd_dispatch;
+  PFN_vkUpdateDescriptorSets update_descriptor_sets;
+} lsp_vulkan_functions;
+
+/* Fills *functions through the engine's vkGetDeviceProcAddr. LSP_ERROR_UNSUPPORTED if one is missing. */
+lsp_status lsp_vulkan_load_functions(VkDevice device, PFN_vkGetDeviceProcAddr get_device_proc_addr,
+                                     lsp_vulkan_functions* functions, lsp_error* error);
+
+/* Records one piece of the upload from `staging` into `destination`, the buffer of copy->buffer. */
+void lsp_vulkan_record_copy(const lsp_vulkan_functions* functions, VkCommandBuffer commands,
+                            const lsp_vulkan_copy* copy, VkBuffer staging, VkDeviceSize staging_offset,
+                            VkBuffer destination);
+
+/* Records the barrier between the copies and the shaders that read them. */
+void lsp_vulkan_record_upload_barrier(const lsp_vulkan_functions* functions, VkCommandBuffer commands);
+
+/* ---- the trace shader -----------------------------------------------------------------------------------
+ */
+
+#define LSP_VULKAN_GROUP_SIZE 64u
+
+/* Specialization constant of the shader: entries of its stack, at least header->max_stack. Default 96. */
+#define LSP_VULKAN_STACK_CONSTANT 0u
+
+/* Push constants, compute stage, from offset 0: rays [first, first + count) of the buffers. */
+typedef struct lsp_vulkan_trace_constants {
+  uint32_t flags; /* LSP_TRACE_* */
+  float lod;
+  uint32_t first;
+  uint32_t count;
+} lsp_vulkan_trace_constants;
+
+/* SPIR-V (for Vulkan 1.1, no features needed) of the trace shader, entry point "main"; with `counting`
+ * nonzero the one that adds to the counters. Sets *bytes to its size. The words live as long as the program.
+ */
+const uint32_t* lsp_vulkan_trace_spirv(int counting, size_t* bytes);
+
+/* The bindings of its descriptor set layout. */
+void lsp_vulkan_layout_bindings(VkDescriptorSetLayoutBinding bindings[LSP_BINDING_COUNT]);
+
+/* Points `set` at the scene's buffers (in the plan's order), and at rays, hits and counters. What the scene
+ * has no buffer for is bound to the header's. `counters` may be VK_NULL_HANDLE for the shader that does not
+ * count. */
+void lsp_vulkan_write_descriptors(const lsp_vulkan_functions* functions, VkDevice device, VkDescriptorSet set,
+                                  const lsp_vulkan_plan* plan, const VkBuffer* buffers, VkBuffer rays,
+                                  VkBuffer hits, VkBuffer counters);
+
+/* Rays that one dispatch can trace on the device. */
+uint32_t lsp_vulkan_max_rays(const lsp_vulkan_limits* limits);
+
+/* Records the dispatch: binds pipeline and set, pushes the constants, one invocation a ray. Barriers before
+ * (rays written by earlier commands) and after (hits read by later ones) are the engine's.
+ *
+ * A hit whose flags have LSP_HIT_INCOMPLETE set was cut short by the device (lavapipe ends all loops of a
+ * SIMD vector after 65,535 iterations) or by the header's declared bounds: trace that ray with lsp_trace. */
+void lsp_vulkan_record_trace(const lsp_vulkan_functions* functions, VkCommandBuffer commands,
+                             VkPipeline pipeline, VkPipelineLayout layout, VkDescriptorSet set,
+                             const lsp_vulkan_trace_constants* constants);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* LSP_LSP_VULKAN_H */

@@ -1,0 +1,105 @@
+// Which buffers a scene needs on a device, and the pieces of their upload. Arithmetic only.
+#include "../src/error.h"
+#include "lsp/lsp_vulkan.h"
+
+namespace {
+
+// The sections behind the bindings, in the order of the plan.
+struct Wanted {
+  uint32_t binding;
+  uint32_t section;
+  uint32_t uses;  // any of these asks for it
+};
+constexpr uint32_t kTraces = LSP_USE_EXACT | LSP_USE_APPROXIMATE;
+constexpr Wanted kWanted[] = {
+    {LSP_BINDING_NODES, LSP_SECTION_NODE, kTraces},
+    {LSP_BINDING_TRIANGLES, LSP_SECTION_TRIA, kTraces},
+    {LSP_BINDING_NORMALS, LSP_SECTION_NRML, kTraces},
+    {LSP_BINDING_LINE_SPACES, LSP_SECTION_LSPC, LSP_USE_APPROXIMATE},
+    {LSP_BINDING_BIT_WORDS, LSP_SECTION_BITS, LSP_USE_APPROXIMATE},
+    {LSP_BINDING_CANDIDATES, LSP_SECTION_CAND, LSP_USE_APPROXIMATE},
+    {LSP_BINDING_NONE, LSP_SECTION_MATL, LSP_USE_MATERIALS},
+};
+
+const LspSection* find_section(const lsp_scene& scene, uint32_t type) {
+  for (uint32_t i = 0; i < scene.header->section_count; ++i) {
+    if (scene.sections[i].type == type) return &scene.sections[i];
+  }
+  return nullptr;
+}
+
+unsigned long long print(uint64_t value) { return value; }
+
+}  // namespace
+
+extern "C" lsp_status lsp_vulkan_plan_buffers(const lsp_scene* scene, uint32_t uses,
+                                              const lsp_vulkan_limits* limits, lsp_vulkan_plan* plan,
+                                              lsp_error* error) {
+  *plan = {};
+  const uint32_t features = scene->header->required_features;
+  if ((uses & LSP_USE_EXACT) != 0 && (features & LSP_FEATURE_EXACT) == 0) {
+    return lsp::fail(error, LSP_ERROR_UNSUPPORTED, 0, "has no exact tree; trace it approximately");
+  }
+  if ((uses & LSP_USE_APPROXIMATE) != 0 && (features & LSP_FEATURE_LINE_SPACES) == 0) {
+    return lsp::fail(error, LSP_ERROR_UNSUPPORTED, 0, "has no Line Spaces; trace it exactly");
+  }
+  if ((uses & LSP_USE_MATERIALS) != 0 && (features & LSP_FEATURE_MATERIALS) == 0) {
+    return lsp::fail(error, LSP_ERROR_UNSUPPORTED, 0, "has no materials");
+  }
+  plan->buffers[0] = {LSP_BINDING_HEADER, 0, 0, sizeof(LspHeader)};
+  plan->buffer_count = 1;
+  plan->bytes = sizeof(LspHeader);
+  for (const Wanted& wanted : kWanted) {
+    if ((uses & wanted.uses) == 0) continue;
+    const LspSection* section = find_section(*scene, wanted.section);
+    if (section == nullptr || section->bytes == 0) continue;
+    if (section->bytes > limits->max_storage_buffer_range) {
+      return lsp::fail(error, LSP_ERROR_LIMIT, section->offset,
+                       "section %.4s has %llu bytes, storage buffers of this device have at most %llu "
+                       "(maxStorageBufferRange); trace it on the CPU or bake a smaller file",
+                       reinterpret_cast<const char*>(&section->type), print(section->bytes),
+                       print(limits->max_storage_buffer_range));
+    }
+    plan->buffers[plan->buffer_count++] = {wanted.binding, wanted.section, section->offset, section->bytes};
+    plan->bytes += section->bytes;
+  }
+  return lsp::succeed(error);
+}
+
+extern "C" lsp_status lsp_vulkan_check_import(const lsp_scene* scene, const lsp_vulkan_limits* limits,
+                                              lsp_error* error) {
+  const uint64_t alignment = limits->import_alignment;
+  if (alignment == 0) {
+    return lsp::fail(error, LSP_ERROR_UNSUPPORTED, 0,
+                     "the device cannot import host memory (VK_EXT_external_memory_host)");
+  }
+  if (reinterpret_cast<uintptr_t>(scene->bytes) % alignment != 0 || scene->size % alignment != 0) {
+    return lsp::fail(
+        error, LSP_ERROR_UNSUPPORTED, 0,
+        "address or size (%llu bytes) is not a multiple of %llu, the device's import alignment; bake "
+        "with --align %u",
+        print(scene->size), print(alignment), alignment > 4096 ? 65536u : 4096u);
+  }
+  return lsp::succeed(error);
+}
+
+extern "C" int lsp_vulkan_next_copy(const lsp_scene* scene, const lsp_vulkan_plan* plan, uint64_t max_bytes,
+                                    uint64_t* cursor, lsp_vulkan_copy* copy) {
+  // The cursor counts the bytes of all buffers laid one behind the other.
+  uint64_t begin = 0;
+  for (uint32_t i = 0; i < plan->buffer_count; ++i) {
+    const lsp_vulkan_buffer& buffer = plan->buffers[i];
+    if (*cursor < begin + buffer.bytes) {
+      const uint64_t offset = *cursor - begin;
+      const uint64_t left = buffer.bytes - offset;
+      copy->buffer = i;
+      copy->buffer_offset = offset;
+      copy->source = static_cast<const unsigned char*>(scene->bytes) + buffer.file_offset + offset;
+      copy->bytes = left < max_bytes ? left : max_bytes;
+      *cursor += copy->bytes;
+      return 1;
+    }
+    begin += buffer.bytes;
+  }
+  return 0;
+}

@@ -1,0 +1,106 @@
+// Recording into the engine's command buffers, and the trace shader's words.
+#include "../src/error.h"
+#include "lsp/lsp_vulkan.h"
+
+namespace {
+
+constexpr uint32_t kTraceSpirv[] =
+#include "trace.spv.inc"
+    ;
+constexpr uint32_t kTraceCountSpirv[] =
+#include "trace_count.spv.inc"
+    ;
+
+template <class Function>
+bool load(VkDevice device, PFN_vkGetDeviceProcAddr get, const char* name, Function* function) {
+  *function = reinterpret_cast<Function>(get(device, name));
+  return *function != nullptr;
+}
+
+}  // namespace
+
+extern "C" lsp_status lsp_vulkan_load_functions(VkDevice device, PFN_vkGetDeviceProcAddr get,
+                                                lsp_vulkan_functions* functions, lsp_error* error) {
+  *functions = {};
+  const bool all = load(device, get, "vkCmdCopyBuffer", &functions->cmd_copy_buffer) &&
+                   load(device, get, "vkCmdPipelineBarrier", &functions->cmd_pipeline_barrier) &&
+                   load(device, get, "vkCmdBindPipeline", &functions->cmd_bind_pipeline) &&
+                   load(device, get, "vkCmdBindDescriptorSets", &functions->cmd_bind_descriptor_sets) &&
+                   load(device, get, "vkCmdPushConstants", &functions->cmd_push_constants) &&
+                   load(device, get, "vkCmdDispatch", &functions->cmd_dispatch) &&
+                   load(device, get, "vkUpdateDescriptorSets", &functions->update_descriptor_sets);
+  if (!all) return lsp::fail(error, LSP_ERROR_UNSUPPORTED, 0, "the device lacks a function of Vulkan 1.0");
+  return lsp::succeed(error);
+}
+
+extern "C" void lsp_vulkan_record_copy(const lsp_vulkan_functions* functions, VkCommandBuffer commands,
+                                       const lsp_vulkan_copy* copy, VkBuffer staging,
+                                       VkDeviceSize staging_offset, VkBuffer destination) {
+  const VkBufferCopy region{staging_offset, copy->buffer_offset, copy->bytes};
+  functions->cmd_copy_buffer(commands, staging, destination, 1, &region);
+}
+
+extern "C" void lsp_vulkan_record_upload_barrier(const lsp_vulkan_functions* functions,
+                                                 VkCommandBuffer commands) {
+  VkMemoryBarrier barrier{};
+  barrier.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;
+  barrier.srcAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT;
+  barrier.dstAccessMask = VK_ACCESS_SHADER_READ_BIT;
+  functions->cmd_pipeline_barrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT,
+                                  VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, 0, 1, &barrier, 0, nullptr, 0, nullptr);
+}
+
+extern "C" const uint32_t* lsp_vulkan_trace_spirv(int counting, size_t* bytes) {
+  *bytes = counting != 0 ? sizeof kTraceCountSpirv : sizeof kTraceSpirv;
+  return counting != 0 ? kTraceCountSpirv : kTraceSpirv;
+}
+
+extern "C" void lsp_vulkan_layout_bindings(VkDescriptorSetLayoutBinding bindings[LSP_BINDING_COUNT]) {
+  for (uint32_t i = 0; i < LSP_BINDING_COUNT; ++i) {
+    bindings[i] = {i, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr};
+  }
+}
+
+extern "C" void lsp_vulkan_write_descriptors(const lsp_vulkan_functions* functions, VkDevice device,
+                                             VkDescriptorSet set, const lsp_vulkan_plan* plan,
+                                             const VkBuffer* buffers, VkBuffer rays, VkBuffer hits,
+                                             VkBuffer counters) {
+  VkDescriptorBufferInfo infos[LSP_BINDING_COUNT];
+  for (VkDescriptorBufferInfo& info : infos) info = {buffers[0], 0, VK_WHOLE_SIZE};
+  for (uint32_t i = 0; i < plan->buffer_count; ++i) {
+    if (plan->buffers[i].binding < LSP_BINDING_COUNT) infos[plan->buffers[i].binding].buffer = buffers[i];
+  }
+  infos[LSP_BINDING_RAYS].buffer = rays;
+  infos[LSP_BINDING_HITS].buffer = hits;
+  if (counters != VK_NULL_HANDLE) infos[LSP_BINDING_COUNTERS].buffer = counters;
+  VkWriteDescriptorSet write{};
+  write.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
+  write.dstSet = set;
+  write.descriptorCount = 1;
+  write.descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
+  for (uint32_t i = 0; i < LSP_BINDING_COUNT; ++i) {
+    write.dstBinding = i;
+    write.pBufferInfo = &infos[i];
+    functions->update_descriptor_sets(device, 1, &write, 0, nullptr);
+  }
+}
+
+extern "C" uint32_t lsp_vulkan_max_rays(const lsp_vulkan_limits* limits) {
+  // Rays and hits have 32 bytes; indices of their 16-byte words are 32-bit in the shader.
+  uint64_t rays = uint64_t{limits->max_group_count} * LSP_VULKAN_GROUP_SIZE;
+  const uint64_t in_range = limits->max_storage_buffer_range / sizeof(LspRay);
+  if (rays > in_range) rays = in_range;
+  return rays > 0x7FFFFFFFu ? 0x7FFFFFFFu : static_cast<uint32_t>(rays);
+}
+
+extern "C" void lsp_vulkan_record_trace(const lsp_vulkan_functions* functions, VkCommandBuffer commands,
+                                        VkPipeline pipeline, VkPipelineLayout layout, VkDescriptorSet set,
+                                        const lsp_vulkan_trace_constants* constants) {
+  functions->cmd_bind_pipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline);
+  functions->cmd_bind_descriptor_sets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, layout, 0, 1, &set, 0,
+                                      nullptr);
+  functions->cmd_push_constants(commands, layout, VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof *constants,
+                                constants);
+  functions->cmd_dispatch(commands, (constants->count + LSP_VULKAN_GROUP_SIZE - 1) / LSP_VULKAN_GROUP_SIZE, 1,
+                          1);
+}

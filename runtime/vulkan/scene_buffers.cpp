@@ -1,0 +1,238 @@
+#include "scene_buffers.h"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <utility>
+
+namespace lsp {
+namespace {
+
+constexpr uint64_t kPieceBytes = 1u << 20;  // larger pieces are slow from a mapping that is not in memory yet
+constexpr size_t kRingSlots = 4;
+constexpr VkExternalMemoryHandleTypeFlagBits kHostPointer =
+    VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT;
+
+[[noreturn]] void refuse(const std::string& why) { throw Failure(Exit::kUnsupported, "", why); }
+
+lsp_vulkan_plan make_plan(const Device& device, const lsp_scene& scene, uint32_t uses) {
+  lsp_vulkan_plan plan;
+  lsp_error error;
+  const lsp_status status = lsp_vulkan_plan_buffers(&scene, uses, &device.limits, &plan, &error);
+  if (status != LSP_OK) throw Failure(static_cast<Exit>(status), "", error.message);
+  return plan;
+}
+
+// Staging memory, its command buffer and the fence that says it may be filled again.
+struct Slot {
+  Buffer staging;
+  VkCommandBuffer commands = VK_NULL_HANDLE;
+  VkFence fence = VK_NULL_HANDLE;
+};
+
+class Ring {
+ public:
+  explicit Ring(Device& device) : device_(device) {
+    try {
+      for (Slot& slot : slots_) {
+        slot.staging = Buffer(device, kPieceBytes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
+                              VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT, 0);
+        VkCommandBufferAllocateInfo info{};
+        info.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO;
+        info.commandPool = device.pool;
+        info.commandBufferCount = 1;
+        check(device.vk.vkAllocateCommandBuffers(device.handle, &info, &slot.commands),
+              "vkAllocateCommandBuffers");
+        VkFenceCreateInfo fence{};
+        fence.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO;
+        fence.flags = VK_FENCE_CREATE_SIGNALED_BIT;
+        check(device.vk.vkCreateFence(device.handle, &fence, nullptr, &slot.fence), "vkCreateFence");
+      }
+    } catch (...) {
+      destroy();
+      throw;
+    }
+  }
+  ~Ring() {
+    device_.vk.vkDeviceWaitIdle(device_.handle);
+    destroy();
+  }
+  Ring(const Ring&) = delete;
+  Ring& operator=(const Ring&) = delete;
+
+  void copy(const lsp_vulkan_copy& piece, VkBuffer destination) {
+    Slot& slot = slots_[next_++ % kRingSlots];
+    check(device_.vk.vkWaitForFences(device_.handle, 1, &slot.fence, VK_TRUE, UINT64_MAX), "vkWaitForFences");
+    memcpy(slot.staging.mapped(), piece.source, piece.bytes);
+    VkCommandBufferBeginInfo begin{};
+    begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
+    begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
+    check(device_.vk.vkBeginCommandBuffer(slot.commands, &begin), "vkBeginCommandBuffer");
+    lsp_vulkan_record_copy(&device_.functions, slot.commands, &piece, slot.staging.handle(), 0, destination);
+    lsp_vulkan_record_upload_barrier(&device_.functions, slot.commands);
+    check(device_.vk.vkEndCommandBuffer(slot.commands), "vkEndCommandBuffer");
+    check(device_.vk.vkResetFences(device_.handle, 1, &slot.fence), "vkResetFences");
+    VkSubmitInfo submit{};
+    submit.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO;
+    submit.commandBufferCount = 1;
+    submit.pCommandBuffers = &slot.commands;
+    check(device_.vk.vkQueueSubmit(device_.queue, 1, &submit, slot.fence), "vkQueueSubmit");
+  }
+
+  void finish() {
+    for (const Slot& slot : slots_) {
+      check(device_.vk.vkWaitForFences(device_.handle, 1, &slot.fence, VK_TRUE, UINT64_MAX),
+            "vkWaitForFences");
+    }
+  }
+
+ private:
+  void destroy() noexcept {
+    for (Slot& slot : slots_) {
+      device_.vk.vkDestroyFence(device_.handle, slot.fence, nullptr);
+      if (slot.commands != VK_NULL_HANDLE) {
+        device_.vk.vkFreeCommandBuffers(device_.handle, device_.pool, 1, &slot.commands);
+      }
+    }
+  }
+  Device& device_;
+  std::array<Slot, kRingSlots> slots_;
+  size_t next_ = 0;
+};
+
+// Creates a buffer that may lie in imported host memory.
+VkBuffer create_importable(Device& device, uint64_t bytes) {
+  VkExternalMemoryBufferCreateInfo external{};
+  external.sType = VK_STRUCTURE_TYPE_EXTERNAL_MEMORY_BUFFER_CREATE_INFO;
+  external.handleTypes = kHostPointer;
+  VkBufferCreateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO;
+  info.pNext = &external;
+  info.size = bytes;
+  info.usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
+  VkBuffer buffer = VK_NULL_HANDLE;
+  check(device.vk.vkCreateBuffer(device.handle, &info, nullptr, &buffer), "vkCreateBuffer");
+  return buffer;
+}
+
+void check_importable(const Device& device) {
+  VkPhysicalDeviceExternalBufferInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_EXTERNAL_BUFFER_INFO;
+  info.usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
+  info.handleType = kHostPointer;
+  VkExternalBufferProperties properties{};
+  properties.sType = VK_STRUCTURE_TYPE_EXTERNAL_BUFFER_PROPERTIES;
+  vkGetPhysicalDeviceExternalBufferProperties(device.physical, &info, &properties);
+  if ((properties.externalMemoryProperties.externalMemoryFeatures &
+       VK_EXTERNAL_MEMORY_FEATURE_IMPORTABLE_BIT) == 0) {
+    refuse("the device does not import host memory into storage buffers");
+  }
+}
+
+}  // namespace
+
+SceneBuffers::SceneBuffers(SceneBuffers&& other) noexcept
+    : device_(other.device_),
+      plan_(other.plan_),
+      owned_(std::move(other.owned_)),
+      imported_(std::exchange(other.imported_, VK_NULL_HANDLE)),
+      bytes_imported_(other.bytes_imported_),
+      bytes_uploaded_(other.bytes_uploaded_) {
+  std::copy(std::begin(other.handles_), std::end(other.handles_), handles_);
+  std::fill(std::begin(other.handles_), std::end(other.handles_), VkBuffer{VK_NULL_HANDLE});
+}
+
+SceneBuffers::~SceneBuffers() {
+  if (!owned_.empty()) return;  // they end with their owners
+  for (VkBuffer buffer : handles_) device_->vk.vkDestroyBuffer(device_->handle, buffer, nullptr);
+  device_->vk.vkFreeMemory(device_->handle, imported_, nullptr);
+}
+
+SceneBuffers SceneBuffers::import_mapping(Device& device, const lsp_scene& scene, uint32_t uses) {
+  SceneBuffers result(device);
+  result.plan_ = make_plan(device, scene, uses);
+  lsp_error error;
+  if (lsp_vulkan_check_import(&scene, &device.limits, &error) != LSP_OK) refuse(error.message);
+  check_importable(device);
+
+  VkMemoryHostPointerPropertiesEXT pointer{};
+  pointer.sType = VK_STRUCTURE_TYPE_MEMORY_HOST_POINTER_PROPERTIES_EXT;
+  if (device.vk.vkGetMemoryHostPointerPropertiesEXT(device.handle, kHostPointer, scene.bytes, &pointer) !=
+      VK_SUCCESS) {
+    refuse("the device cannot import this memory");
+  }
+  uint32_t types = pointer.memoryTypeBits;
+  for (uint32_t i = 0; i < result.plan_.buffer_count; ++i) {
+    const lsp_vulkan_buffer& planned = result.plan_.buffers[i];
+    result.handles_[i] = create_importable(device, planned.bytes);
+    VkMemoryRequirements requirements;
+    device.vk.vkGetBufferMemoryRequirements(device.handle, result.handles_[i], &requirements);
+    types &= requirements.memoryTypeBits;
+    if (planned.file_offset % requirements.alignment != 0 ||
+        planned.file_offset + requirements.size > scene.size) {
+      refuse("a section does not lie in the file as the device's buffers have to lie in memory");
+    }
+  }
+  const int type = device.memory_type(types, 0, VK_MEMORY_PROPERTY_HOST_CACHED_BIT);
+  if (type < 0) refuse("no memory type of the device fits both the mapping and a storage buffer");
+
+  VkImportMemoryHostPointerInfoEXT import{};
+  import.sType = VK_STRUCTURE_TYPE_IMPORT_MEMORY_HOST_POINTER_INFO_EXT;
+  import.handleType = kHostPointer;
+  import.pHostPointer = const_cast<void*>(scene.bytes);  // the shaders' buffers are read-only
+  VkMemoryAllocateInfo allocation{};
+  allocation.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO;
+  allocation.pNext = &import;
+  allocation.allocationSize = scene.size;
+  allocation.memoryTypeIndex = static_cast<uint32_t>(type);
+  if (device.vk.vkAllocateMemory(device.handle, &allocation, nullptr, &result.imported_) != VK_SUCCESS) {
+    refuse("the driver refused to import the mapping");
+  }
+  for (uint32_t i = 0; i < result.plan_.buffer_count; ++i) {
+    check(device.vk.vkBindBufferMemory(device.handle, result.handles_[i], result.imported_,
+                                       result.plan_.buffers[i].file_offset),
+          "vkBindBufferMemory");
+  }
+  result.bytes_imported_ = scene.size;
+  return result;
+}
+
+SceneBuffers SceneBuffers::upload(Device& device, const lsp_scene& scene, uint32_t uses, bool staging) {
+  SceneBuffers result(device);
+  result.plan_ = make_plan(device, scene, uses);
+  bool mapped = true;
+  for (uint32_t i = 0; i < result.plan_.buffer_count; ++i) {
+    constexpr VkMemoryPropertyFlags kHost =
+        VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
+    result.owned_.emplace_back(device, result.plan_.buffers[i].bytes, LSP_VULKAN_BUFFER_USAGE,
+                               VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT, staging ? 0 : kHost);
+    result.handles_[i] = result.owned_.back().handle();
+    mapped = mapped && result.owned_.back().mapped() != nullptr;
+  }
+  if (mapped && !staging) {
+    result.upload_mapped(scene);
+  } else {
+    result.upload_staged(scene);
+  }
+  result.bytes_uploaded_ = result.plan_.bytes;
+  return result;
+}
+
+void SceneBuffers::upload_mapped(const lsp_scene& scene) {
+  lsp_vulkan_copy piece;
+  for (uint64_t cursor = 0; lsp_vulkan_next_copy(&scene, &plan_, kPieceBytes, &cursor, &piece) != 0;) {
+    memcpy(static_cast<unsigned char*>(owned_[piece.buffer].mapped()) + piece.buffer_offset, piece.source,
+           piece.bytes);
+  }
+}
+
+void SceneBuffers::upload_staged(const lsp_scene& scene) {
+  Ring ring(*device_);
+  lsp_vulkan_copy piece;
+  for (uint64_t cursor = 0; lsp_vulkan_next_copy(&scene, &plan_, kPieceBytes, &cursor, &piece) != 0;) {
+    ring.copy(piece, handles_[piece.buffer]);
+  }
+  ring.finish();
+}
+
+}  // namespace lsp

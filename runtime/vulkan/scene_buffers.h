@@ -1,0 +1,44 @@
+// An open scene's sections as buffers of a device, by import of the mapping or by upload.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "device.h"
+
+namespace lsp {
+
+class SceneBuffers {
+ public:
+  // Imports scene->bytes. Throws Failure(kUnsupported) where the device does not allow it; DeviceLost and
+  // other failures of Vulkan as they come. The scene's bytes must outlive the buffers.
+  static SceneBuffers import_mapping(Device& device, const lsp_scene& scene, uint32_t uses);
+
+  // Copies the sections to memory of the device. With `staging` always through a ring of staging buffers,
+  // else straight into device memory that the host sees where there is such memory.
+  static SceneBuffers upload(Device& device, const lsp_scene& scene, uint32_t uses, bool staging);
+
+  ~SceneBuffers();
+  SceneBuffers(SceneBuffers&& other) noexcept;
+  SceneBuffers& operator=(SceneBuffers&& other) = delete;
+
+  const lsp_vulkan_plan& plan() const { return plan_; }
+  const VkBuffer* handles() const { return handles_; }
+  uint64_t bytes_imported() const { return bytes_imported_; }
+  uint64_t bytes_uploaded() const { return bytes_uploaded_; }
+
+ private:
+  explicit SceneBuffers(Device& device) : device_(&device) {}
+  void upload_mapped(const lsp_scene& scene);
+  void upload_staged(const lsp_scene& scene);
+
+  Device* device_;
+  lsp_vulkan_plan plan_{};
+  VkBuffer handles_[LSP_VULKAN_MAX_BUFFERS]{};
+  std::vector<Buffer> owned_;                 // upload: the buffers behind the handles
+  VkDeviceMemory imported_ = VK_NULL_HANDLE;  // import: the one memory behind all buffers
+  uint64_t bytes_imported_ = 0;
+  uint64_t bytes_uploaded_ = 0;
+};
+
+}  // namespace lsp

@@ -1,0 +1,57 @@
+// One ray per invocation: rays from a buffer, hits into another. With LSP_COUNT defined, sums of the work done
+// are added to the counters (struct lsp_trace_counts of lsp.h, less its first field: the host knows the rays).
+#version 460
+#extension GL_GOOGLE_include_directive : require
+
+#include "lsp/lsp.glsl"
+
+layout(local_size_x = 64) in;
+
+// As words: 16-byte loads and stores are faster than member by member, and keep every bit.
+layout(std430, set = 0, binding = 7) readonly buffer RayBuffer { uvec4 ray_words[]; };
+layout(std430, set = 0, binding = 8) writeonly buffer HitBuffer { uvec4 hit_words[]; };
+
+layout(push_constant) uniform Constants {
+  uint flags;
+  float lod;
+  uint first;
+  uint count;
+} constants;
+
+#ifdef LSP_COUNT
+layout(std430, set = 0, binding = 9) buffer CounterBuffer { uint counter_words[]; };
+
+// Adds to the 64-bit field `field`; the carry is taken by whoever caused it.
+void add(uint field, uint n) {
+  if (n == 0u) return;
+  uint before = atomicAdd(counter_words[2u * field], n);
+  if (before + n < before) atomicAdd(counter_words[2u * field + 1u], 1u);
+}
+#endif
+
+void main() {
+  if (gl_GlobalInvocationID.x >= constants.count) return;
+  uint index = constants.first + gl_GlobalInvocationID.x;
+  uvec4 a = ray_words[2u * index];
+  uvec4 b = ray_words[2u * index + 1u];
+  LspRay ray = LspRay(uintBitsToFloat(a.xyz), uintBitsToFloat(a.w), uintBitsToFloat(b.xyz), uintBitsToFloat(b.w));
+
+  bool valid;
+#ifdef LSP_COUNT
+  LspCounts counts = LspCounts(0u, 0u, 0u);
+  LspHit hit = lsp_trace_ray(ray, constants.flags, constants.lod, valid, counts);
+  if ((hit.flags & LSP_HIT_INCOMPLETE) == 0u) {  // an incomplete ray is traced, and counted, again
+    add(1u, valid ? 0u : 1u);
+    add(2u, hit.primitive != LSP_NONE ? 1u : 0u);
+    add(3u, counts.nodes);
+    add(4u, counts.shafts);
+    add(5u, counts.triangles);
+  }
+#else
+  LspHit hit = lsp_trace_ray(ray, constants.flags, constants.lod, valid);
+#endif
+
+  hit_words[2u * index] =
+      uvec4(floatBitsToUint(hit.t), hit.primitive, floatBitsToUint(hit.u), floatBitsToUint(hit.v));
+  hit_words[2u * index + 1u] = uvec4(floatBitsToUint(hit.normal), hit.flags);
+}

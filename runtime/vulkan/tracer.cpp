@@ -1,0 +1,452 @@
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+#include <optional>
+
+#include "device.h"
+#include "scene_buffers.h"
+
+namespace lsp {
+namespace {
+
+constexpr uint32_t kBatchRays = 1u << 20;
+constexpr VkMemoryPropertyFlags kHost =
+    VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+void record_barrier(Device& device, VkCommandBuffer commands, VkPipelineStageFlags from,
+                    VkAccessFlags written, VkPipelineStageFlags to, VkAccessFlags read) {
+  VkMemoryBarrier barrier{};
+  barrier.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;
+  barrier.srcAccessMask = written;
+  barrier.dstAccessMask = read;
+  device.vk.vkCmdPipelineBarrier(commands, from, to, 0, 1, &barrier, 0, nullptr, 0, nullptr);
+}
+
+// Everything of the trace shader that lasts as long as the device: layouts, descriptor set, commands, timer.
+class Shader {
+ public:
+  explicit Shader(Device& device) : device_(device) {
+    try {
+      create();
+    } catch (...) {
+      destroy();
+      throw;
+    }
+  }
+  ~Shader() { destroy(); }
+  Shader(const Shader&) = delete;
+  Shader& operator=(const Shader&) = delete;
+
+  // A pipeline whose stack has `stack` entries. The caller destroys it.
+  VkPipeline create_pipeline(bool counting, uint32_t stack) {
+    size_t bytes = 0;
+    VkShaderModuleCreateInfo module_info{};
+    module_info.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
+    module_info.pCode = lsp_vulkan_trace_spirv(counting ? 1 : 0, &bytes);
+    module_info.codeSize = bytes;
+    VkShaderModule module = VK_NULL_HANDLE;
+    check(device_.vk.vkCreateShaderModule(device_.handle, &module_info, nullptr, &module),
+          "vkCreateShaderModule");
+    const VkSpecializationMapEntry entry{LSP_VULKAN_STACK_CONSTANT, 0, sizeof stack};
+    const VkSpecializationInfo specialization{1, &entry, sizeof stack, &stack};
+    VkComputePipelineCreateInfo info{};
+    info.sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO;
+    info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
+    info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
+    info.stage.module = module;
+    info.stage.pName = "main";
+    info.stage.pSpecializationInfo = &specialization;
+    info.layout = layout;
+    VkPipeline pipeline = VK_NULL_HANDLE;
+    const VkResult result =
+        device_.vk.vkCreateComputePipelines(device_.handle, VK_NULL_HANDLE, 1, &info, nullptr, &pipeline);
+    device_.vk.vkDestroyShaderModule(device_.handle, module, nullptr);
+    check(result, "vkCreateComputePipelines");
+    return pipeline;
+  }
+
+  VkPipelineLayout layout = VK_NULL_HANDLE;
+  VkDescriptorSet set = VK_NULL_HANDLE;
+  VkCommandBuffer commands = VK_NULL_HANDLE;
+  VkFence fence = VK_NULL_HANDLE;
+  VkQueryPool timer = VK_NULL_HANDLE;  // null where the device has no timestamps
+
+ private:
+  void create() {
+    VkDescriptorSetLayoutBinding bindings[LSP_BINDING_COUNT];
+    lsp_vulkan_layout_bindings(bindings);
+    VkDescriptorSetLayoutCreateInfo set_info{};
+    set_info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO;
+    set_info.bindingCount = LSP_BINDING_COUNT;
+    set_info.pBindings = bindings;
+    check(device_.vk.vkCreateDescriptorSetLayout(device_.handle, &set_info, nullptr, &set_layout_),
+          "vkCreateDescriptorSetLayout");
+    const VkPushConstantRange push{VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof(lsp_vulkan_trace_constants)};
+    VkPipelineLayoutCreateInfo layout_info{};
+    layout_info.sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO;
+    layout_info.setLayoutCount = 1;
+    layout_info.pSetLayouts = &set_layout_;
+    layout_info.pushConstantRangeCount = 1;
+    layout_info.pPushConstantRanges = &push;
+    check(device_.vk.vkCreatePipelineLayout(device_.handle, &layout_info, nullptr, &layout),
+          "vkCreatePipelineLayout");
+
+    const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, LSP_BINDING_COUNT};
+    VkDescriptorPoolCreateInfo pool_info{};
+    pool_info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO;
+    pool_info.maxSets = 1;
+    pool_info.poolSizeCount = 1;
+    pool_info.pPoolSizes = &size;
+    check(device_.vk.vkCreateDescriptorPool(device_.handle, &pool_info, nullptr, &pool_),
+          "vkCreateDescriptorPool");
+    VkDescriptorSetAllocateInfo set_allocation{};
+    set_allocation.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO;
+    set_allocation.descriptorPool = pool_;
+    set_allocation.descriptorSetCount = 1;
+    set_allocation.pSetLayouts = &set_layout_;
+    check(device_.vk.vkAllocateDescriptorSets(device_.handle, &set_allocation, &set),
+          "vkAllocateDescriptorSets");
+
+    VkCommandBufferAllocateInfo commands_info{};
+    commands_info.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO;
+    commands_info.commandPool = device_.pool;
+    commands_info.commandBufferCount = 1;
+    check(device_.vk.vkAllocateCommandBuffers(device_.handle, &commands_info, &commands),
+          "vkAllocateCommandBuffers");
+    VkFenceCreateInfo fence_info{};
+    fence_info.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO;
+    check(device_.vk.vkCreateFence(device_.handle, &fence_info, nullptr, &fence), "vkCreateFence");
+    if (device_.seconds_per_tick > 0) {
+      VkQueryPoolCreateInfo timer_info{};
+      timer_info.sType = VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO;
+      timer_info.queryType = VK_QUERY_TYPE_TIMESTAMP;
+      timer_info.queryCount = 2;
+      check(device_.vk.vkCreateQueryPool(device_.handle, &timer_info, nullptr, &timer), "vkCreateQueryPool");
+    }
+  }
+
+  void destroy() noexcept {
+    device_.vk.vkDestroyQueryPool(device_.handle, timer, nullptr);
+    device_.vk.vkDestroyFence(device_.handle, fence, nullptr);
+    if (commands != VK_NULL_HANDLE)
+      device_.vk.vkFreeCommandBuffers(device_.handle, device_.pool, 1, &commands);
+    device_.vk.vkDestroyDescriptorPool(device_.handle, pool_, nullptr);
+    device_.vk.vkDestroyPipelineLayout(device_.handle, layout, nullptr);
+    device_.vk.vkDestroyDescriptorSetLayout(device_.handle, set_layout_, nullptr);
+  }
+
+  Device& device_;
+  VkDescriptorSetLayout set_layout_ = VK_NULL_HANDLE;
+  VkDescriptorPool pool_ = VK_NULL_HANDLE;
+};
+
+// The pipelines for one scene's stack, made when they are first needed.
+class Pipelines {
+ public:
+  Pipelines(Device& device, Shader& shader, uint32_t stack)
+      : device_(device), shader_(shader), stack_(stack) {}
+  ~Pipelines() {
+    for (VkPipeline pipeline : made_) device_.vk.vkDestroyPipeline(device_.handle, pipeline, nullptr);
+  }
+  Pipelines(const Pipelines&) = delete;
+  Pipelines& operator=(const Pipelines&) = delete;
+  VkPipeline get(bool counting) {
+    VkPipeline& pipeline = made_[counting ? 1 : 0];
+    if (pipeline == VK_NULL_HANDLE) pipeline = shader_.create_pipeline(counting, stack_);
+    return pipeline;
+  }
+
+ private:
+  Device& device_;
+  Shader& shader_;
+  uint32_t stack_;
+  VkPipeline made_[2]{};
+};
+
+// Rays and hits of one batch. Where device and host share memory the shader works on what the host writes; on
+// a discrete device it works on memory of its own, filled and emptied by transfers.
+struct BatchBuffers {
+  Buffer rays;
+  Buffer hits;
+  Buffer device_rays;  // discrete devices only
+  Buffer device_hits;
+  uint32_t capacity = 0;
+
+  BatchBuffers() = default;
+  BatchBuffers(Device& device, uint32_t count) : capacity(count) {
+    const VkDeviceSize bytes = VkDeviceSize{count} * sizeof(LspRay);
+    constexpr VkBufferUsageFlags kStorage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
+    constexpr VkBufferUsageFlags kFrom = VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
+    constexpr VkBufferUsageFlags kTo = VK_BUFFER_USAGE_TRANSFER_DST_BIT;
+    rays = Buffer(device, bytes, kStorage | kFrom, kHost, 0);
+    hits = Buffer(device, bytes, kStorage | kTo, kHost, VK_MEMORY_PROPERTY_HOST_CACHED_BIT);
+    if (device.shares_memory) return;
+    device_rays = Buffer(device, bytes, kStorage | kTo, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT, 0);
+    device_hits = Buffer(device, bytes, kStorage | kFrom, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT, 0);
+  }
+  bool staged() const { return device_rays.handle() != VK_NULL_HANDLE; }
+  VkBuffer shader_rays() const { return staged() ? device_rays.handle() : rays.handle(); }
+  VkBuffer shader_hits() const { return staged() ? device_hits.handle() : hits.handle(); }
+};
+
+}  // namespace
+
+const char* name_of(LoadPath path) {
+  switch (path) {
+    case LoadPath::kImport:
+      return "import";
+    case LoadPath::kUpload:
+      return "upload";
+    default:
+      return "automatic";
+  }
+}
+
+class VulkanTracer::Impl {
+ public:
+  explicit Impl(const VulkanOptions& options) : options_(options) { open(); }
+  ~Impl() { close(); }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  void load(const lsp_scene& scene, uint32_t uses, LoadPath path);
+  VulkanTrace trace(const lsp_trace_options& options, std::span<const LspRay> rays, std::span<LspHit> hits,
+                    bool count);
+
+  std::unique_ptr<Device> device;
+  std::unique_ptr<SceneBuffers> scene_buffers;
+  LoadPath load_path = LoadPath::kAutomatic;
+  std::string load_note;
+  double load_seconds = 0;
+  std::string device_name;
+
+ private:
+  void open();
+  void close() noexcept;
+  void unload() noexcept;
+  void attach(SceneBuffers&& buffers);
+  bool try_import(bool forced);
+  double trace_batch(const lsp_trace_options& options, const LspRay* rays, LspHit* hits, uint32_t count,
+                     bool counting);
+  void record_batch(const lsp_trace_options& options, uint32_t count, bool counting);
+  void retrace(const lsp_trace_options& options, std::span<const LspRay> rays, std::span<LspHit> hits,
+               bool count, VulkanTrace& result) const;
+
+  VulkanOptions options_;
+  lsp_scene scene_{};
+  uint32_t uses_ = 0;
+  std::unique_ptr<Shader> shader_;
+  std::unique_ptr<Pipelines> pipelines_;
+  Buffer counters_;
+  BatchBuffers batch_;
+};
+
+void VulkanTracer::Impl::open() {
+  device = std::make_unique<Device>(options_);
+  device_name = device->properties.deviceName;
+  shader_ = std::make_unique<Shader>(*device);
+  counters_ = Buffer(*device, sizeof(lsp_trace_counts), VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, kHost, 0);
+}
+
+void VulkanTracer::Impl::close() noexcept {
+  unload();
+  batch_ = {};
+  counters_ = {};
+  shader_.reset();
+  device.reset();
+}
+
+void VulkanTracer::Impl::unload() noexcept {
+  pipelines_.reset();
+  scene_buffers.reset();
+}
+
+// Makes `buffers` the scene and traces one ray, so that a device that cannot read them fails here.
+void VulkanTracer::Impl::attach(SceneBuffers&& buffers) {
+  scene_buffers = std::make_unique<SceneBuffers>(std::move(buffers));
+  pipelines_ = std::make_unique<Pipelines>(*device, *shader_, std::max(scene_.header->max_stack, 1u));
+  const LspHeader& header = *scene_.header;
+  const LspRay ray{header.bounds_min, 0.0f, {1.0f, 1.0f, 1.0f}, 3.402823e38f};
+  LspHit hit;
+  const uint32_t flags = (uses_ & LSP_USE_EXACT) != 0 ? 0 : LSP_TRACE_APPROXIMATE;
+  trace({flags, 0.0f}, {&ray, 1}, {&hit, 1}, false);
+}
+
+bool VulkanTracer::Impl::try_import(bool forced) {
+  if (!forced && !device->shares_memory) {
+    load_note = "the device has memory of its own";
+    return false;
+  }
+  try {
+    attach(SceneBuffers::import_mapping(*device, scene_, uses_));
+    return true;
+  } catch (const DeviceLost& lost) {
+    load_note = lost.what();
+    close();
+    open();
+  } catch (const Failure& failure) {
+    // A section that does not fit, or is not there, fails by upload too: let that say so.
+    load_note = failure.what();
+    unload();
+  }
+  if (forced) throw Failure(Exit::kUnsupported, "", "the mapping cannot be imported: " + load_note);
+  return false;
+}
+
+void VulkanTracer::Impl::load(const lsp_scene& scene, uint32_t uses, LoadPath path) {
+  const auto start = std::chrono::steady_clock::now();
+  unload();
+  scene_ = scene;
+  uses_ = uses;
+  load_note.clear();
+  if (path != LoadPath::kUpload && try_import(path == LoadPath::kImport)) {
+    load_path = LoadPath::kImport;
+  } else {
+    attach(SceneBuffers::upload(*device, scene_, uses_, options_.discrete));
+    load_path = LoadPath::kUpload;
+  }
+  load_seconds = seconds_since(start);
+}
+
+void VulkanTracer::Impl::record_batch(const lsp_trace_options& options, uint32_t count, bool counting) {
+  constexpr VkPipelineStageFlagBits kCompute = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT;
+  constexpr VkPipelineStageFlags kTransfer = VK_PIPELINE_STAGE_TRANSFER_BIT;
+  const auto& vk = device->vk;
+  const VkCommandBuffer commands = shader_->commands;
+  const VkBufferCopy all{0, 0, VkDeviceSize{count} * sizeof(LspRay)};
+  VkCommandBufferBeginInfo begin{};
+  begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
+  begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
+  check(vk.vkBeginCommandBuffer(commands, &begin), "vkBeginCommandBuffer");
+  if (batch_.staged()) {
+    vk.vkCmdCopyBuffer(commands, batch_.rays.handle(), batch_.device_rays.handle(), 1, &all);
+    record_barrier(*device, commands, kTransfer, VK_ACCESS_TRANSFER_WRITE_BIT, kCompute,
+                   VK_ACCESS_SHADER_READ_BIT);
+  }
+  if (shader_->timer != VK_NULL_HANDLE) {
+    vk.vkCmdResetQueryPool(commands, shader_->timer, 0, 2);
+    vk.vkCmdWriteTimestamp(commands, kCompute, shader_->timer, 0);
+  }
+  const lsp_vulkan_trace_constants constants{options.flags, options.lod, 0, count};
+  lsp_vulkan_record_trace(&device->functions, commands, pipelines_->get(counting), shader_->layout,
+                          shader_->set, &constants);
+  if (shader_->timer != VK_NULL_HANDLE) vk.vkCmdWriteTimestamp(commands, kCompute, shader_->timer, 1);
+  if (batch_.staged()) {
+    record_barrier(*device, commands, kCompute, VK_ACCESS_SHADER_WRITE_BIT, kTransfer,
+                   VK_ACCESS_TRANSFER_READ_BIT);
+    vk.vkCmdCopyBuffer(commands, batch_.device_hits.handle(), batch_.hits.handle(), 1, &all);
+  }
+  record_barrier(*device, commands, kCompute | kTransfer,
+                 VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_WRITE_BIT, VK_PIPELINE_STAGE_HOST_BIT,
+                 VK_ACCESS_HOST_READ_BIT);
+}
+
+// Returns the seconds in the shader.
+double VulkanTracer::Impl::trace_batch(const lsp_trace_options& options, const LspRay* rays, LspHit* hits,
+                                       uint32_t count, bool counting) {
+  memcpy(batch_.rays.mapped(), rays, size_t{count} * sizeof(LspRay));
+  if (counting) memset(counters_.mapped(), 0, sizeof(lsp_trace_counts));
+  record_batch(options, count, counting);
+  device->submit_and_wait(shader_->commands, shader_->fence);
+  memcpy(hits, batch_.hits.mapped(), size_t{count} * sizeof(LspHit));
+  if (shader_->timer == VK_NULL_HANDLE) return 0;
+  uint64_t ticks[2] = {};
+  check(device->vk.vkGetQueryPoolResults(device->handle, shader_->timer, 0, 2, sizeof ticks, ticks,
+                                         sizeof ticks[0], VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT),
+        "vkGetQueryPoolResults");
+  return static_cast<double>(ticks[1] - ticks[0]) * device->seconds_per_tick;
+}
+
+void VulkanTracer::Impl::retrace(const lsp_trace_options& options, std::span<const LspRay> rays,
+                                 std::span<LspHit> hits, bool count, VulkanTrace& result) const {
+  for (size_t i = 0; i < hits.size(); ++i) {
+    if ((hits[i].flags & LSP_HIT_INCOMPLETE) == 0) continue;
+    lsp_trace_counts counts{};
+    lsp_error error;
+    const lsp_status status =
+        lsp_trace(&scene_, &options, &rays[i], &hits[i], 1, count ? &counts : nullptr, &error);
+    if (status != LSP_OK) throw Failure(static_cast<Exit>(status), "", error.message);
+    ++result.retraced;
+    result.counts.invalid += counts.invalid;
+    result.counts.hits += counts.hits;
+    result.counts.nodes += counts.nodes;
+    result.counts.shafts += counts.shafts;
+    result.counts.triangles += counts.triangles;
+  }
+}
+
+VulkanTrace VulkanTracer::Impl::trace(const lsp_trace_options& options, std::span<const LspRay> rays,
+                                      std::span<LspHit> hits, bool count) {
+  const uint32_t needed = (options.flags & LSP_TRACE_APPROXIMATE) != 0 ? LSP_USE_APPROXIMATE : LSP_USE_EXACT;
+  if (scene_buffers == nullptr || (uses_ & needed) == 0) {
+    throw Failure(Exit::kUnsupported, "", "the scene is not loaded for this kind of trace");
+  }
+  if (hits.size() != rays.size()) throw Failure(Exit::kInternal, "", "as many hits as rays are needed");
+  const auto start = std::chrono::steady_clock::now();
+  VulkanTrace result;
+  const uint32_t most = std::min(lsp_vulkan_max_rays(&device->limits), kBatchRays);
+  const auto capacity = static_cast<uint32_t>(std::min<size_t>(rays.size(), most));
+  if (capacity > batch_.capacity) {
+    batch_ = {};  // before the new ones are made, not after
+    batch_ = BatchBuffers(*device, capacity);
+  }
+  lsp_vulkan_write_descriptors(&device->functions, device->handle, shader_->set, &scene_buffers->plan(),
+                               scene_buffers->handles(), batch_.shader_rays(), batch_.shader_hits(),
+                               counters_.handle());
+  for (size_t first = 0; first < rays.size(); first += most) {
+    const auto size = static_cast<uint32_t>(std::min<size_t>(rays.size() - first, most));
+    result.gpu_seconds += trace_batch(options, &rays[first], &hits[first], size, count);
+    if (count) {
+      lsp_trace_counts counts;
+      memcpy(&counts, counters_.mapped(), sizeof counts);
+      result.counts.invalid += counts.invalid;
+      result.counts.hits += counts.hits;
+      result.counts.nodes += counts.nodes;
+      result.counts.shafts += counts.shafts;
+      result.counts.triangles += counts.triangles;
+    }
+    ++result.batches;
+  }
+  result.counts.rays = rays.size();
+  retrace(options, rays, hits, count, result);
+  result.seconds = seconds_since(start);
+  return result;
+}
+
+bool VulkanTracer::available(std::string* why) { return Device::any(why); }
+
+VulkanTracer::VulkanTracer(const VulkanOptions& options) : impl_(std::make_unique<Impl>(options)) {}
+VulkanTracer::~VulkanTracer() = default;
+VulkanTracer::VulkanTracer(VulkanTracer&&) noexcept = default;
+VulkanTracer& VulkanTracer::operator=(VulkanTracer&&) noexcept = default;
+
+void VulkanTracer::load(const lsp_scene& scene, uint32_t uses, LoadPath path) {
+  impl_->load(scene, uses, path);
+}
+
+VulkanTrace VulkanTracer::trace(const lsp_trace_options& options, std::span<const LspRay> rays,
+                                std::span<LspHit> hits, bool count) {
+  return impl_->trace(options, rays, hits, count);
+}
+
+const std::string& VulkanTracer::device_name() const { return impl_->device_name; }
+LoadPath VulkanTracer::load_path() const { return impl_->load_path; }
+const std::string& VulkanTracer::load_note() const { return impl_->load_note; }
+uint64_t VulkanTracer::bytes_imported() const {
+  return impl_->scene_buffers == nullptr ? 0 : impl_->scene_buffers->bytes_imported();
+}
+uint64_t VulkanTracer::bytes_uploaded() const {
+  return impl_->scene_buffers == nullptr ? 0 : impl_->scene_buffers->bytes_uploaded();
+}
+double VulkanTracer::load_seconds() const { return impl_->load_seconds; }
+
+std::vector<std::string> VulkanTracer::validation_messages() const {
+  const std::lock_guard lock(impl_->device->messages_mutex);
+  return impl_->device->messages;
+}
+
+}  // namespace lsp
