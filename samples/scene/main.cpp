@@ -1,0 +1,47 @@
+// lsp-sample-scene: writes a procedural scene as a binary glTF file.
+#include <chrono>
+#include <nlohmann/json.hpp>
+
+#include "../command_line.h"
+#include "../output_file.h"
+#include "scene.h"
+
+int main(int argc, char** argv) {
+  using namespace lsp;
+  using namespace lsp::sample;
+  constexpr const char* kProgram = "lsp-sample-scene";
+  CLI::App app("Writes a procedural scene, in metres and with y up, as a binary glTF file.", kProgram);
+  CommonOptions common;
+  std::string output;
+  std::string name = "atrium";
+  uint64_t triangles = 0;
+  add_common_options(app, kProgram, common);
+  app.add_option("OUT.glb", output, "The file to write")->required();
+  app.add_option("--scene", name, "atrium, spheres or plane")
+      ->check(CLI::IsMember({"atrium", "spheres", "plane"}));
+  app.add_option("--triangles", triangles, "About how many triangles (default: as fine as looks good)")
+      ->check(CLI::Range(uint64_t{1000}, uint64_t{20'000'000}));
+  return run_program(kProgram, app, argc, argv, [&] {
+    const auto start = std::chrono::steady_clock::now();
+    const Scene scene = make_scene(name, triangles == 0 ? Detail{} : detail_for(name, triangles));
+    const std::string bytes = to_glb(scene);
+    write_file(output, bytes);
+    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+    if (common.json) {
+      std::cout << nlohmann::ordered_json{{"file", output},
+                                          {"scene", name},
+                                          {"triangles", triangle_count(scene)},
+                                          {"meshes", scene.meshes.size()},
+                                          {"nodes", scene.nodes.size()},
+                                          {"materials", scene.materials.size()},
+                                          {"bytes", bytes.size()},
+                                          {"seconds", seconds.count()}}
+                       .dump(2)
+                << "\n";
+    } else if (!common.quiet) {
+      std::cout << output << ": " << name << ", " << triangle_count(scene) << " triangles in "
+                << scene.meshes.size() << " meshes and " << scene.nodes.size() << " nodes, " << bytes.size()
+                << " bytes, " << seconds.count() << " s\n";
+    }
+  });
+}
