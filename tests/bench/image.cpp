@@ -1,0 +1,148 @@
+#include "image.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+
+#define STB_IMAGE_WRITE_IMPLEMENTATION
+#define STBI_WRITE_NO_STDIO
+#include <stb/stb_image_write.h>
+
+#include "lsp/program.h"
+#include "same_size.h"
+
+namespace lsp::bench {
+
+Image read_pfm(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw Failure(Exit::kFile, path, "cannot be read");
+  std::string magic;
+  uint32_t width = 0, height = 0;
+  float scale = 0;
+  file >> magic >> width >> height >> scale;
+  file.get();
+  const size_t channels = magic == "PF" ? 3 : magic == "Pf" ? 1 : 0;
+  if (!file || channels == 0 || width == 0 || height == 0 || width > 65536 || height > 65536 || scale == 0) {
+    throw Failure(Exit::kInvalid, path, "is no .pfm picture");
+  }
+  Image image(width, height);
+  std::vector<float> row(width * channels);
+  for (uint32_t y = height; y-- > 0;) {  // rows from the bottom
+    file.read(reinterpret_cast<char*>(row.data()), static_cast<std::streamsize>(row.size() * sizeof(float)));
+    if (!file) throw Failure(Exit::kInvalid, path, "ends early");
+    for (uint32_t x = 0; x < width; ++x) {
+      for (size_t c = 0; c < 3; ++c) {
+        auto bits = std::bit_cast<uint32_t>(row[x * channels + (channels == 3 ? c : 0)]);
+        if (scale > 0) bits = __builtin_bswap32(bits);  // a positive scale means big-endian
+        image.at(x, y)[static_cast<int>(c)] = std::bit_cast<float>(bits);
+      }
+    }
+  }
+  return image;
+}
+
+std::string encode_png(const Image& image) {
+  std::vector<uint8_t> bytes;
+  bytes.reserve(image.pixels.size() * 3);
+  for (const glm::vec3& pixel : image.pixels) {
+    for (int c = 0; c < 3; ++c) {
+      const float value = std::clamp(pixel[c], 0.0f, 1.0f);
+      bytes.push_back(static_cast<uint8_t>(std::lround(value * 255.0f)));
+    }
+  }
+  std::string png;
+  const auto append = [](void* out, void* data, int size) {
+    static_cast<std::string*>(out)->append(static_cast<const char*>(data), static_cast<size_t>(size));
+  };
+  stbi_write_png_to_func(append, &png, static_cast<int>(image.width), static_cast<int>(image.height), 3,
+                         bytes.data(), static_cast<int>(image.width * 3));
+  return png;
+}
+
+Image to_display(const Image& linear, float exposure) {
+  Image image = linear;
+  for (glm::vec3& pixel : image.pixels) {
+    for (int c = 0; c < 3; ++c) {
+      const float x = std::clamp(pixel[c] * exposure, 0.0f, 1.0f);
+      pixel[c] = x <= 0.0031308f ? 12.92f * x : 1.055f * std::pow(x, 1 / 2.4f) - 0.055f;
+    }
+  }
+  return image;
+}
+
+double rmse(const Image& reference, const Image& image) {
+  require_same_size(reference, image);
+  double sum = 0;
+  for (size_t i = 0; i < image.pixels.size(); ++i) {
+    const glm::dvec3 off = glm::dvec3(image.pixels[i]) - glm::dvec3(reference.pixels[i]);
+    sum += glm::dot(off, off);
+  }
+  return std::sqrt(sum / (3 * static_cast<double>(image.pixels.size())));
+}
+
+double bias(const Image& reference, const Image& image) {
+  require_same_size(reference, image);
+  glm::dvec3 sum(0);
+  for (size_t i = 0; i < image.pixels.size(); ++i) {
+    sum += glm::dvec3(image.pixels[i]) - glm::dvec3(reference.pixels[i]);
+  }
+  return (sum.x + sum.y + sum.z) / (3 * static_cast<double>(image.pixels.size()));
+}
+
+double psnr(const Image& reference, const Image& image, double peak) {
+  const double error = rmse(reference, image);
+  return error > 0 ? 20 * std::log10(peak / error) : INFINITY;
+}
+
+double ssim(const Image& reference, const Image& image) {
+  require_same_size(reference, image);
+  constexpr int kRadius = 5;
+  constexpr double kSigma = 1.5, kC1 = 0.01 * 0.01, kC2 = 0.03 * 0.03;
+  const int width = static_cast<int>(image.width), height = static_cast<int>(image.height);
+  if (width <= 2 * kRadius || height <= 2 * kRadius) {
+    throw Failure(Exit::kInvalid, "", "pictures under 11 x 11 pixels have no structural similarity");
+  }
+  double weights[2 * kRadius + 1], total = 0;
+  for (int k = -kRadius; k <= kRadius; ++k) {
+    total += weights[k + kRadius] = std::exp(-k * k / (2 * kSigma * kSigma));
+  }
+  for (double& weight : weights) weight /= total;
+
+  // The five moments x, y, xx, yy, xy, blurred along rows, then along columns.
+  using Moments = std::array<double, 5>;
+  const auto luma = [](const glm::vec3& p) { return 0.2126 * p.r + 0.7152 * p.g + 0.0722 * p.b; };
+  const int columns = width - 2 * kRadius;
+  std::vector<Moments> rows(static_cast<size_t>(columns) * static_cast<size_t>(height));
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < columns; ++x) {
+      Moments sum{};
+      for (int k = 0; k <= 2 * kRadius; ++k) {
+        const double a = luma(reference.at(static_cast<uint32_t>(x + k), static_cast<uint32_t>(y)));
+        const double b = luma(image.at(static_cast<uint32_t>(x + k), static_cast<uint32_t>(y)));
+        const Moments moments{a, b, a * a, b * b, a * b};
+        for (size_t m = 0; m < 5; ++m) sum[m] += weights[k] * moments[m];
+      }
+      rows[static_cast<size_t>(y * columns + x)] = sum;
+    }
+  }
+  double similarity = 0;
+  for (int y = 0; y < height - 2 * kRadius; ++y) {
+    for (int x = 0; x < columns; ++x) {
+      Moments m{};
+      for (int k = 0; k <= 2 * kRadius; ++k) {
+        for (size_t i = 0; i < 5; ++i)
+          m[i] += weights[k] * rows[static_cast<size_t>((y + k) * columns + x)][i];
+      }
+      const double var_a = m[2] - m[0] * m[0], var_b = m[3] - m[1] * m[1], cov = m[4] - m[0] * m[1];
+      similarity += (2 * m[0] * m[1] + kC1) * (2 * cov + kC2) /
+                    ((m[0] * m[0] + m[1] * m[1] + kC1) * (var_a + var_b + kC2));
+    }
+  }
+  return similarity / (static_cast<double>(columns) * (height - 2 * kRadius));
+}
+
+}  // namespace lsp::bench
