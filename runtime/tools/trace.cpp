@@ -1,0 +1,203 @@
+// lsp-trace: traces a file of rays against an .lsp file.
+#include <algorithm>
+#include <iostream>
+#include <optional>
+#include <thread>
+
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "lsp/program.h"
+#include "lsp/scene_file.hpp"
+#include "ray_files.h"
+#include "trace_run.h"
+
+namespace lsp {
+namespace {
+
+struct Options {
+  std::string file;
+  std::string rays;
+  std::string hits;
+  std::string backend = "cpu";
+  std::string mode;  // empty: approximate where the file has Line Spaces, else exact
+  std::string query = "closest";
+  std::string near = "exact";
+  std::string load_path = "automatic";
+  std::string device;
+  float lod = 0;
+  uint32_t repeats = 1;
+  uint32_t threads = std::max(1u, std::thread::hardware_concurrency());
+  bool quiet = false;
+  bool json = false;
+};
+
+void define(CLI::App& app, Options& options) {
+  app.set_version_flag("--version", std::string("lsp-trace ") + kProgramVersion + ", format " +
+                                        std::to_string(LSP_VERSION_MAJOR) + "." +
+                                        std::to_string(LSP_VERSION_MINOR));
+  app.add_option("FILE.lsp", options.file, "The scene")->required();
+  app.add_option("--rays", options.rays, "Rays: 32 bytes each, origin, tmin, direction, tmax as float32")
+      ->required();
+  app.add_option("--hits", options.hits,
+                 "Hits to write: 32 bytes each, t, primitive, u, v, normal as float32 (primitive uint32), "
+                 "flags uint32")
+      ->required();
+  app.add_option("--backend", options.backend, "Where to trace")->check(CLI::IsMember({"cpu", "vulkan"}));
+  app.add_option("--mode", options.mode,
+                 "Down to triangles or by Line Spaces; without it by Line Spaces if there are any")
+      ->check(CLI::IsMember({"exact", "approximate"}));
+  app.add_option("--query", options.query, "The closest hit or any hit")
+      ->check(CLI::IsMember({"closest", "any"}));
+  app.add_option(
+         "--lod", options.lod,
+         "Stop at a Line Space once its diagonal is under THETA times the distance; 0: only at the deepest")
+      ->check(CLI::Range(0.0f, 1e6f));
+  app.add_option("--near", options.near, "How to answer where a Line Space's node holds the ray's origin")
+      ->check(CLI::IsMember({"exact", "approximate"}));
+  app.add_option("--repeat", options.repeats, "Times to trace all rays")->check(CLI::Range(1u, 1000000u));
+  app.add_option("--threads", options.threads, "Threads of the CPU backend; all without it")
+      ->check(CLI::Range(1u, 65536u));
+  app.add_option("--device", options.device,
+                 "Part of the Vulkan device's name; without it a GPU if there is one");
+  app.add_option("--load", options.load_path, "How the scene gets to the Vulkan device")
+      ->check(CLI::IsMember({"automatic", "import", "upload"}));
+  app.add_flag("--quiet", options.quiet, "Print nothing but errors");
+  app.add_flag("--json", options.json, "Print one JSON object");
+}
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const size_t half = values.size() / 2;
+  return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
+}
+
+double per(double sum, uint64_t count) { return count == 0 ? 0.0 : sum / static_cast<double>(count); }
+
+TraceRequest make_request(const Options& options, const LspHeader& header) {
+  TraceRequest request;
+  const bool line_spaces = (header.required_features & LSP_FEATURE_LINE_SPACES) != 0;
+  const bool approximate = options.mode.empty() ? line_spaces : options.mode == "approximate";
+  if (approximate) request.options.flags |= LSP_TRACE_APPROXIMATE;
+  if (options.query == "any") request.options.flags |= LSP_TRACE_ANY_HIT;
+  if (options.near == "approximate") request.options.flags |= LSP_TRACE_NEAR_APPROXIMATE;
+  request.options.lod = options.lod;
+  request.vulkan = options.backend == "vulkan";
+  request.repeats = options.repeats;
+  request.threads = options.threads;
+  request.device = options.device;
+  if (options.load_path == "import") request.load_path = LoadPath::kImport;
+  if (options.load_path == "upload") request.load_path = LoadPath::kUpload;
+  request.progress = !options.quiet && isatty(STDERR_FILENO) != 0;
+  return request;
+}
+
+nlohmann::ordered_json to_json(const Options& options, const TraceRequest& request, const SceneFile& file,
+                               const TraceReport& report) {
+  const lsp_trace_counts& counts = report.counts;
+  nlohmann::ordered_json json;
+  json["program"] = "lsp-trace";
+  json["version"] = kProgramVersion;
+  json["file"] = options.file;
+  json["backend"] = options.backend;
+  json["mode"] = (request.options.flags & LSP_TRACE_APPROXIMATE) != 0 ? "approximate" : "exact";
+  json["query"] = options.query;
+  json["near"] = options.near;
+  json["lod"] = options.lod;
+  json["threads"] = request.vulkan ? 0u : options.threads;
+  json["rays"] = counts.rays;
+  json["invalid"] = counts.invalid;
+  json["hits"] = counts.hits;
+  json["seconds"] = report.seconds;
+  if (request.vulkan) json["gpu_seconds"] = report.gpu_seconds;
+  const double seconds = median(report.seconds);
+  json["mrays_per_second"] = seconds > 0 ? static_cast<double>(counts.rays) * 1e-6 / seconds : 0.0;
+  json["device"] = report.device;
+  json["load_path"] = report.load_path;
+  if (!report.load_note.empty()) json["load_note"] = report.load_note;
+  if (request.vulkan) json["load_seconds"] = report.load_seconds;
+  json["bytes_mapped"] = file.bytes_mapped();
+  json["bytes_paged_in"] = report.bytes_paged_in;
+  json["bytes_imported"] = report.bytes_imported;
+  json["bytes_uploaded"] = report.bytes_uploaded;
+  json["retraced"] = report.retraced;
+  json["nodes_per_ray"] = per(static_cast<double>(counts.nodes), counts.rays);
+  json["shafts_per_ray"] = per(static_cast<double>(counts.shafts), counts.rays);
+  json["triangles_per_ray"] = per(static_cast<double>(counts.triangles), counts.rays);
+  return json;
+}
+
+void print(const nlohmann::ordered_json& json) {
+  const auto number = [&](const char* key) { return json[key].get<double>(); };
+  printf("%.0f rays (%.0f invalid), %.0f hits, %s, %s\n", number("rays"), number("invalid"), number("hits"),
+         json["mode"].get<std::string>().c_str(), json["query"].get<std::string>().c_str());
+  printf("%.3f Mrays/s on %s, load path %s\n", number("mrays_per_second"),
+         json["device"].get<std::string>().c_str(), json["load_path"].get<std::string>().c_str());
+  printf("a ray: %.2f nodes, %.2f shafts, %.2f triangles\n", number("nodes_per_ray"),
+         number("shafts_per_ray"), number("triangles_per_ray"));
+  printf("bytes: %.0f mapped, %.0f paged in, %.0f imported, %.0f uploaded\n", number("bytes_mapped"),
+         number("bytes_paged_in"), number("bytes_imported"), number("bytes_uploaded"));
+  if (number("retraced") > 0)
+    printf("%.0f rays were cut short by the device and traced on the CPU\n", number("retraced"));
+}
+
+// What a packed file may grow to: the machine's memory.
+uint64_t physical_memory() {
+  const long pages = sysconf(_SC_PHYS_PAGES);
+  const long page = sysconf(_SC_PAGESIZE);
+  return pages > 0 && page > 0 ? static_cast<uint64_t>(pages) * static_cast<uint64_t>(page) : UINT64_MAX;
+}
+
+void run(const Options& options) {
+  const SceneFile file(options.file, physical_memory());
+  const std::vector<LspRay> rays = read_rays(options.rays);
+  std::vector<LspHit> hits(rays.size());
+  const TraceRequest request = make_request(options, file.header());
+  nlohmann::ordered_json json;
+  try {
+    json = to_json(options, request, file, trace_rays(file.scene(), file.unpacked(), request, rays, hits));
+  } catch (const Failure& failure) {
+    // The tracers do not know the file's name.
+    throw Failure(failure.exit(), failure.file().empty() ? options.file : failure.file(), failure.what());
+  }
+  write_hits(options.hits, hits);
+  if (options.json) {
+    std::cout << json.dump(2) << "\n";
+  } else if (!options.quiet) {
+    print(json);
+  }
+}
+
+int run_program(int argc, char** argv) {
+  CLI::App app("Traces a file of rays against an .lsp file and writes a file of hits.");
+  Options options;
+  define(app, options);
+  try {
+    app.parse(argc, argv);
+    run(options);
+    return static_cast<int>(Exit::kDone);
+  } catch (const CLI::Success& e) {  // --help, --version
+    app.exit(e);
+    return static_cast<int>(Exit::kDone);
+  } catch (const CLI::ParseError& e) {
+    std::cerr << "lsp-trace: " << e.what() << "; see lsp-trace --help\n";
+    return static_cast<int>(Exit::kUsage);
+  } catch (const Failure& e) {
+    std::cerr << "lsp-trace: " << (e.file().empty() ? "" : e.file() + ": ") << e.what() << "\n";
+    return static_cast<int>(e.exit());
+  } catch (const std::bad_alloc&) {
+    std::cerr << "lsp-trace: " << options.rays
+              << ": there is not enough memory for its rays; trace fewer at once\n";
+    return static_cast<int>(Exit::kLimit);
+  } catch (const std::exception& e) {
+    std::cerr << "lsp-trace: internal error: " << e.what() << "; please report it\n";
+    return static_cast<int>(Exit::kInternal);
+  }
+}
+
+}  // namespace
+}  // namespace lsp
+
+int main(int argc, char** argv) { return lsp::run_program(argc, argv); }

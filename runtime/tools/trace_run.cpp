@@ -1,0 +1,155 @@
+#include "trace_run.h"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <fstream>
+#include <functional>
+#include <thread>
+
+#include "lsp/program.h"
+#include "resident.h"
+
+namespace lsp {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr size_t kChunkRays = 4096;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+void add(lsp_trace_counts& sum, const lsp_trace_counts& other) {
+  sum.rays += other.rays;
+  sum.invalid += other.invalid;
+  sum.hits += other.hits;
+  sum.nodes += other.nodes;
+  sum.shafts += other.shafts;
+  sum.triangles += other.triangles;
+}
+
+// One line on standard error, rewritten at most five times a second, once a second has passed.
+class ProgressLine {
+ public:
+  explicit ProgressLine(bool shown) : shown_(shown) {}
+  ~ProgressLine() {
+    if (drawn_) fputs("\r\033[K", stderr);
+  }
+  void show(double done) {
+    if (!shown_ || seconds_since(start_) < 1.0 || seconds_since(last_) < 0.2) return;
+    last_ = Clock::now();
+    drawn_ = true;
+    fprintf(stderr, "\rtracing %3.0f %%", done * 100.0);
+  }
+
+ private:
+  bool shown_;
+  bool drawn_ = false;
+  Clock::time_point start_ = Clock::now();
+  Clock::time_point last_ = Clock::now();
+};
+
+std::string cpu_name() {
+  std::ifstream info("/proc/cpuinfo");
+  for (std::string line; std::getline(info, line);) {
+    const size_t colon = line.find(": ");
+    if (line.rfind("model name", 0) == 0 && colon != std::string::npos) return line.substr(colon + 2);
+  }
+  return "CPU";
+}
+
+// All rays once, by request.threads threads that take chunks as they get to them.
+void trace_cpu(const lsp_scene& scene, const TraceRequest& request, std::span<const LspRay> rays,
+               std::span<LspHit> hits, lsp_trace_counts* counts,
+               const std::function<void(size_t)>& progress) {
+  const size_t chunks = (rays.size() + kChunkRays - 1) / kChunkRays;
+  const auto threads =
+      static_cast<size_t>(std::clamp<uint64_t>(request.threads, 1, std::max<size_t>(chunks, 1)));
+  std::atomic<size_t> next{0};
+  std::vector<lsp_trace_counts> sums(threads);
+  std::vector<lsp_error> errors(threads);
+  const auto work = [&](size_t me) {
+    for (size_t chunk = next++; chunk < chunks; chunk = next++) {
+      const size_t first = chunk * kChunkRays;
+      const size_t size = std::min(kChunkRays, rays.size() - first);
+      if (lsp_trace(&scene, &request.options, &rays[first], &hits[first], size,
+                    counts != nullptr ? &sums[me] : nullptr, &errors[me]) != LSP_OK) {
+        return;
+      }
+      if (me == 0) progress(first + size);
+    }
+  };
+  {
+    std::vector<std::jthread> others;
+    for (size_t i = 1; i < threads; ++i) others.emplace_back(work, i);
+    work(0);
+  }
+  for (const lsp_error& error : errors) {
+    if (error.status != LSP_OK) throw Failure(static_cast<Exit>(error.status), "", error.message);
+  }
+  if (counts == nullptr) return;
+  for (const lsp_trace_counts& sum : sums) add(*counts, sum);
+}
+
+TraceReport trace_on_cpu(const lsp_scene& scene, const TraceRequest& request, std::span<const LspRay> rays,
+                         std::span<LspHit> hits, ProgressLine& line) {
+  TraceReport report;
+  report.device = cpu_name();
+  const double passes = request.repeats + 1.0;
+  double pass = 0;
+  const auto progress = [&](size_t rays_done) {
+    line.show((pass + static_cast<double>(rays_done) / static_cast<double>(rays.size())) / passes);
+  };
+  trace_cpu(scene, request, rays, hits, &report.counts, progress);
+  for (uint32_t i = 0; i < request.repeats; ++i) {
+    ++pass;
+    const auto start = Clock::now();
+    trace_cpu(scene, request, rays, hits, nullptr, progress);
+    report.seconds.push_back(seconds_since(start));
+  }
+  return report;
+}
+
+TraceReport trace_on_vulkan(const lsp_scene& scene, const TraceRequest& request, std::span<const LspRay> rays,
+                            std::span<LspHit> hits, ProgressLine& line) {
+  VulkanOptions options;
+  options.device = request.device;
+  VulkanTracer tracer(options);
+  const bool approximate = (request.options.flags & LSP_TRACE_APPROXIMATE) != 0;
+  tracer.load(scene, approximate ? LSP_USE_APPROXIMATE : LSP_USE_EXACT, request.load_path);
+  TraceReport report;
+  report.device = tracer.device_name();
+  report.load_path = name_of(tracer.load_path());
+  report.load_note = tracer.load_note();
+  report.load_seconds = tracer.load_seconds();
+  report.bytes_imported = tracer.bytes_imported();
+  report.bytes_uploaded = tracer.bytes_uploaded();
+  const VulkanTrace counted = tracer.trace(request.options, rays, hits, true);
+  report.counts = counted.counts;
+  report.retraced = counted.retraced;
+  if (!rays.empty())
+    tracer.trace(request.options, rays.first(1), hits.first(1));  // compiles the shader to be timed
+  for (uint32_t i = 0; i < request.repeats; ++i) {
+    line.show((i + 1.0) / (request.repeats + 1.0));
+    const VulkanTrace timed = tracer.trace(request.options, rays, hits);
+    report.seconds.push_back(timed.seconds);
+    report.gpu_seconds.push_back(timed.gpu_seconds);
+  }
+  return report;
+}
+
+}  // namespace
+
+TraceReport trace_rays(const lsp_scene& scene, bool unpacked, const TraceRequest& request,
+                       std::span<const LspRay> rays, std::span<LspHit> hits) {
+  ProgressLine line(request.progress);
+  TraceReport report = request.vulkan ? trace_on_vulkan(scene, request, rays, hits, line)
+                                      : trace_on_cpu(scene, request, rays, hits, line);
+  if (report.load_path.empty()) report.load_path = unpacked ? "unpacked" : "mapped";
+  if (!unpacked) report.bytes_paged_in = resident_bytes(scene.bytes);
+  return report;
+}
+
+}  // namespace lsp
