@@ -1,0 +1,45 @@
+#include "check.h"
+
+#include "layers.h"
+
+namespace lsp::format {
+namespace {
+
+// Whether the references of the tree can be followed: everything later layers index with was in range.
+bool tree_sound(const Report& report) {
+  for (RuleId id : {RuleId::kChildOutOfRange, RuleId::kChildNotAfterParent, RuleId::kTwoParents})
+    if (report.has(id)) return false;
+  return true;
+}
+
+bool usable_or_absent(const FileView& view, Kind kind) {
+  const Part& part = view.part(kind);
+  return part.usable || (!part.present && declared_count(view.header, kind).value_or(0) == 0);
+}
+
+}  // namespace
+
+Report check_file(std::span<const std::byte> bytes, const CheckOptions& options) {
+  Report report(options.examples_per_rule);
+  FileView view = view_file(bytes);
+  check_identification(view, report);
+  if (report.fatal()) return report;
+  check_header(view, report);
+  if (report.fatal()) return report;
+  check_sections(view, report);
+  check_hashes_and_codec(view, options.memory_limit, report);
+  if (options.source) check_source(view, *options.source, report);
+  if (report.fatal()) return report;
+  check_metadata(view, report);
+  if (options.level < Level::kStructure) return report;
+
+  const bool tree = usable_or_absent(view, Kind::kNode) && usable_or_absent(view, Kind::kTria);
+  if (tree) check_tree(view, report);
+  if (view.part(Kind::kLspc).usable) check_line_spaces(view, report);
+  if (options.level < Level::kGeometry) return report;
+
+  if (tree && tree_sound(report)) check_geometry(view, report);
+  return report;
+}
+
+}  // namespace lsp::format

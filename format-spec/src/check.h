@@ -1,0 +1,33 @@
+// Checks an .lsp file in memory against the rule catalogue.
+//
+// The bytes may be hostile. No count, offset or size of the file is used before it was checked against the
+// bytes that are there; memory used beyond the file is at most `memory_limit` for unpacked sections and some
+// 30 bytes a node. Nothing is written, no thread is started.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "hash.h"
+#include "report.h"
+
+namespace lsp::format {
+
+enum class Level {
+  kContainer,  // identification, header, section table, hashes, codec, metadata
+  kStructure,  // and the tree, Line Spaces, bitsets, candidates: all that a tracer's indices follow
+  kGeometry,   // and every triangle, normal, material and box
+};
+
+struct CheckOptions {
+  Level level = Level::kStructure;
+  uint64_t memory_limit = uint64_t{8} << 30;  // for the unpacked sections of a packed file
+  uint32_t examples_per_rule = 4;             // how many findings of a rule are kept in full
+  std::optional<Hash128> source;              // hash of the source files to compare with, see hash.h
+};
+
+Report check_file(std::span<const std::byte> bytes, const CheckOptions& options = {});
+
+}  // namespace lsp::format

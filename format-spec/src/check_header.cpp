@@ -1,0 +1,216 @@
+// Identification and header: what the first 256 bytes may say.
+#include <cmath>
+#include <cstddef>
+#include <cstring>
+
+#include "layers.h"
+
+namespace lsp::format {
+namespace {
+
+constexpr uint32_t kMaxSections = 256;
+constexpr uint32_t kMaxReferences = 1u << 30;  // a traversal marks references in their two highest bits
+
+// One finding about a field of the header.
+#define LSP_HEADER_FINDING(id, field, message) \
+  report.add(RuleId::id, offsetof(LspHeader, field), sizeof(LspHeader::field), "/header/" #field, message)
+
+std::string hex(uint32_t value) {
+  char text[16];
+  std::snprintf(text, sizeof text, "0x%X", value);
+  return text;
+}
+
+bool starts_with(std::span<const std::byte> bytes, std::string_view prefix) {
+  return bytes.size() >= prefix.size() && std::memcmp(bytes.data(), prefix.data(), prefix.size()) == 0;
+}
+
+// The signature as text-mode transfers leave it: CR LF made LF, LF made CR LF, the high bit cut off.
+bool text_damaged(std::span<const std::byte> bytes) {
+  return starts_with(bytes, "\x89LSP\n\x1A\n") || starts_with(bytes, "\x89LSP\r\r\n\x1A\r\n") ||
+         starts_with(bytes, "\x89LSP\r\n\x1A\r\n") || starts_with(bytes, "\tLSP\r\n\x1A\n");
+}
+
+bool finite(const lsp_float3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+
+void check_features(const LspHeader& header, const FileView& view, Report& report) {
+  const uint32_t features = header.required_features;
+  const auto has = [&](uint32_t type) {
+    for (const LspSection& section : view.table)
+      if (section.type == type) return true;
+    return false;
+  };
+  // A section of no elements need not be there, so a bit may be set for one that the scene has no use for.
+  const auto expect = [&](uint32_t bit, bool present, uint64_t count, const char* what) {
+    if (((features & bit) != 0) == present || (!present && count == 0)) return;
+    LSP_HEADER_FINDING(
+        kFeatureSection, required_features,
+        std::string(what) +
+            (present ? " is present but its feature bit " : " is missing but its feature bit ") + hex(bit) +
+            (present ? " is clear" : " is set"));
+  };
+  expect(LSP_FEATURE_NORMALS, has(LSP_SECTION_NRML), header.triangle_count, "NRML");
+  expect(LSP_FEATURE_MATERIALS, has(LSP_SECTION_MATL), header.material_count, "MATL");
+  expect(LSP_FEATURE_LINE_SPACES, has(LSP_SECTION_LSPC), header.line_space_count, "LSPC");
+  if ((features & (LSP_FEATURE_EXACT | LSP_FEATURE_LINE_SPACES)) == 0)
+    LSP_HEADER_FINDING(kNothingToTrace, required_features,
+                       "neither EXACT nor LINE_SPACES is set: no ray can be traced");
+}
+
+void check_root(const LspHeader& header, Report& report) {
+  if (header.node_count != 0) {
+    if (header.root != 0)
+      LSP_HEADER_FINDING(kRootReference, root,
+                         "is " + hex(header.root) + ", but a file with nodes has root 0");
+  } else if (header.root == LSP_NONE) {
+    if (header.triangle_count != 0 && header.root_line_space == LSP_NONE)
+      LSP_HEADER_FINDING(kRootReference, root, "is none, but the file has triangles");
+  } else if ((header.root & LSP_LEAF_BIT) == 0) {
+    LSP_HEADER_FINDING(kRootReference, root,
+                       "names node " + std::to_string(header.root) + ", but there are none");
+  } else {
+    const uint64_t first = header.root & LSP_LEAF_FIRST_MASK;
+    const uint64_t count = (header.root >> LSP_LEAF_COUNT_SHIFT & LSP_LEAF_COUNT_MASK) + 1;
+    if (!in_range(first, count, header.triangle_count))
+      LSP_HEADER_FINDING(kRootReference, root,
+                         "is a leaf of triangles " + std::to_string(first) + " to " +
+                             std::to_string(first + count - 1) + " of " +
+                             std::to_string(header.triangle_count));
+  }
+  if (header.root_line_space != LSP_NONE &&
+      (header.root_line_space & LSP_LINE_SPACE_MASK) >= header.line_space_count)
+    LSP_HEADER_FINDING(kRootLineSpace, root_line_space,
+                       "names Line Space " + std::to_string(header.root_line_space & LSP_LINE_SPACE_MASK) +
+                           " of " + std::to_string(header.line_space_count));
+}
+
+void check_base(const LspHeader& header, Report& report) {
+  const bool ntree = header.base_structure == LSP_BASE_NTREE;
+  if ((header.base_structure != LSP_BASE_BVH && !ntree) ||
+      ntree != ((header.required_features & LSP_FEATURE_NTREE) != 0))
+    LSP_HEADER_FINDING(kBaseStructure, base_structure,
+                       "is " + std::to_string(header.base_structure) + " with the feature bit NTREE " +
+                           (header.required_features & LSP_FEATURE_NTREE ? "set" : "clear"));
+  const bool sound = ntree ? header.ntree_branching >= 2 && header.ntree_branching <= 32 &&
+                                 header.ntree_depth >= 1 && header.ntree_depth <= LSP_MAX_STACK
+                           : header.ntree_branching == 0 && header.ntree_depth == 0;
+  if (!sound)
+    LSP_HEADER_FINDING(kNtreeParameters, ntree_branching,
+                       "branching " + std::to_string(header.ntree_branching) + " and depth " +
+                           std::to_string(header.ntree_depth) + " do not fit base structure " +
+                           std::to_string(header.base_structure));
+}
+
+void check_limits(const LspHeader& header, Report& report) {
+  if (header.max_stack > LSP_MAX_STACK)
+    LSP_HEADER_FINDING(kMaxStack, max_stack, "is " + std::to_string(header.max_stack) + ", the limit is 96");
+  if (header.max_depth > LSP_MAX_STACK)
+    LSP_HEADER_FINDING(kDepthBound, max_depth,
+                       "is " + std::to_string(header.max_depth) + ", the limit is 96");
+  if (header.max_leaf_triangles > LSP_MAX_LEAF_TRIANGLES)
+    LSP_HEADER_FINDING(kMaxLeaf, max_leaf_triangles,
+                       "is " + std::to_string(header.max_leaf_triangles) + ", the limit is 16");
+  if (header.section_count > kMaxSections)
+    LSP_HEADER_FINDING(
+        kSectionCount, section_count,
+        "is " + std::to_string(header.section_count) + ", the limit is " + std::to_string(kMaxSections));
+  if (header.node_count > kMaxReferences || header.triangle_count > LSP_LEAF_FIRST_MASK + 1 ||
+      header.line_space_count > kMaxReferences)
+    LSP_HEADER_FINDING(kAddressable, node_count,
+                       std::to_string(header.node_count) + " nodes, " +
+                           std::to_string(header.triangle_count) + " triangles and " +
+                           std::to_string(header.line_space_count) +
+                           " Line Spaces are more than references can name");
+  if (header.resolution > LSP_MAX_RESOLUTION || (header.resolution == 0 && header.line_space_count != 0))
+    LSP_HEADER_FINDING(kBakeParameters, resolution, "is " + std::to_string(header.resolution));
+}
+
+void check_numbers(const LspHeader& header, Report& report) {
+  const lsp_float3 &lo = header.bounds_min, &hi = header.bounds_max;
+  if (!finite(lo) || !finite(hi) || lo.x > hi.x || lo.y > hi.y || lo.z > hi.z)
+    LSP_HEADER_FINDING(kBoundsNotFinite, bounds_min, "the bounds are not finite or inside out");
+  if (!(header.normal_angle_cos >= -1.0f && header.normal_angle_cos <= 1.0f))
+    LSP_HEADER_FINDING(kTolerances, normal_angle_cos, "is " + std::to_string(header.normal_angle_cos));
+  if (!(header.plane_tolerance >= 0.0f && std::isfinite(header.plane_tolerance)))
+    LSP_HEADER_FINDING(kTolerances, plane_tolerance, "is " + std::to_string(header.plane_tolerance));
+  bool zero = header.reserved_0 == 0;
+  for (uint32_t word : header.reserved) zero = zero && word == 0;
+  if (!zero) LSP_HEADER_FINDING(kReservedNotZero, reserved, "reserved_0 or reserved is not zero");
+}
+
+void check_length(const FileView& view, Report& report) {
+  const LspHeader& header = view.header;
+  const uint64_t size = view.bytes.size();
+  if (header.file_bytes > size)
+    LSP_HEADER_FINDING(kTruncated, file_bytes,
+                       "is " + std::to_string(header.file_bytes) + ", but the file ends after " +
+                           std::to_string(size) + " bytes: copy it again");
+  if (header.file_bytes < size)
+    report.add(RuleId::kExtraBytes, header.file_bytes, size - header.file_bytes, "/file",
+               std::to_string(size - header.file_bytes) + " bytes follow the " +
+                   std::to_string(header.file_bytes) + " of the file");
+  const uint64_t alignment = header.alignment;
+  if (alignment != 256 && alignment != 4096 && alignment != 65536) {
+    LSP_HEADER_FINDING(kAlignment, alignment, "is " + std::to_string(alignment));
+  } else if (header.file_bytes % view.section_alignment() != 0) {
+    LSP_HEADER_FINDING(kFileNotPadded, file_bytes,
+                       "is " + std::to_string(header.file_bytes) + ", not a multiple of " +
+                           std::to_string(view.section_alignment()));
+  }
+}
+
+}  // namespace
+
+void check_identification(const FileView& view, Report& report) {
+  const LspHeader& header = view.header;
+  if (text_damaged(view.bytes)) {
+    report.add(RuleId::kTextDamage, 0, 8, "/header/magic_0",
+               "the signature's line ends or high bit were changed by a transfer in text mode: copy it in "
+               "binary mode");
+    return;
+  }
+  if (view.bytes.size() < sizeof(LspHeader)) {
+    report.add(RuleId::kTooShort, 0, view.bytes.size(), "/file",
+               "has " + std::to_string(view.bytes.size()) + " bytes");
+    return;
+  }
+  if (header.magic_0 != LSP_MAGIC_0 || header.magic_1 != LSP_MAGIC_1) {
+    report.add(RuleId::kBadMagic, 0, 8, "/header/magic_0", "this is not an .lsp file");
+    return;
+  }
+  if (header.version_major != LSP_VERSION_MAJOR) {
+    LSP_HEADER_FINDING(
+        kOtherMajor, version_major,
+        "is " + std::to_string(header.version_major) + ": use a program that knows this version");
+    return;
+  }
+  if (header.version_minor > LSP_VERSION_MINOR)
+    LSP_HEADER_FINDING(kNewerMinor, version_minor, "is " + std::to_string(header.version_minor));
+  if (const uint32_t unknown = header.required_features & ~LSP_FEATURES_KNOWN; unknown != 0)
+    LSP_HEADER_FINDING(kUnknownRequired, required_features, "bits " + hex(unknown) + " are not known");
+  if (header.optional_features != 0)
+    LSP_HEADER_FINDING(kUnknownOptional, optional_features,
+                       "bits " + hex(header.optional_features) + " are not known");
+}
+
+void check_header(const FileView& view, Report& report) {
+  const LspHeader& header = view.header;
+  if (header.header_bytes != sizeof(LspHeader))
+    LSP_HEADER_FINDING(kHeaderBytes, header_bytes, "is " + std::to_string(header.header_bytes));
+  if (header.section_table_offset != sizeof(LspHeader))
+    LSP_HEADER_FINDING(kTableOffset, section_table_offset,
+                       "is " + std::to_string(header.section_table_offset));
+  else if (!in_range(header.section_table_offset, uint64_t{header.section_count} * sizeof(LspSection),
+                     view.bytes.size()))
+    LSP_HEADER_FINDING(kTableOutside, section_count,
+                       std::to_string(header.section_count) + " table entries do not fit into " +
+                           std::to_string(view.bytes.size()) + " bytes");
+  check_length(view, report);
+  check_base(header, report);
+  check_limits(header, report);
+  check_numbers(header, report);
+  check_root(header, report);
+  if (!report.fatal()) check_features(header, view, report);
+}
+
+}  // namespace lsp::format

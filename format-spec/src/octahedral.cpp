@@ -1,0 +1,43 @@
+#include "octahedral.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace lsp::format {
+namespace {
+
+float sign_not_zero(float v) { return v >= 0.0f ? 1.0f : -1.0f; }
+
+uint32_t to_snorm(float v) {
+  return static_cast<uint32_t>(static_cast<int32_t>(std::lround(std::clamp(v, -1.0f, 1.0f) * 32767.0f))) &
+         0xFFFFu;
+}
+
+float from_snorm(uint32_t half) { return static_cast<float>(static_cast<int16_t>(half)) / 32767.0f; }
+
+}  // namespace
+
+uint32_t encode_normal(const lsp_float3& n) {
+  const float sum = std::abs(n.x) + std::abs(n.y) + std::abs(n.z);
+  float x = n.x / sum, y = n.y / sum;
+  if (n.z < 0.0f) {
+    const float folded = (1.0f - std::abs(y)) * sign_not_zero(x);
+    y = (1.0f - std::abs(x)) * sign_not_zero(y);
+    x = folded;
+  }
+  return to_snorm(x) | to_snorm(y) << 16;
+}
+
+lsp_float3 decode_normal(uint32_t packed) {
+  float x = from_snorm(packed & 0xFFFFu), y = from_snorm(packed >> 16);
+  const float z = 1.0f - std::abs(x) - std::abs(y);
+  if (z < 0.0f) {
+    const float folded = (1.0f - std::abs(y)) * sign_not_zero(x);
+    y = (1.0f - std::abs(x)) * sign_not_zero(y);
+    x = folded;
+  }
+  const float length = std::sqrt(x * x + y * y + z * z);
+  return {x / length, y / length, z / length};
+}
+
+}  // namespace lsp::format
