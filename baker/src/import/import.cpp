@@ -1,0 +1,78 @@
+#include "import/import.h"
+
+#include <xxhash.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "import/gltf_document.h"
+#include "import/readers.h"
+#include "import/source_file.h"
+#include "lsp/program.h"
+
+namespace lsp {
+namespace {
+
+std::string extension_of(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  for (char& c : extension) {
+    if (c >= 'A' && c <= 'Z') c = char(c - 'A' + 'a');
+  }
+  return extension;
+}
+
+void read_mesh_file(const std::filesystem::path& path, MeshBuilder& builder) {
+  const std::string extension = extension_of(path);
+  if (extension == ".gltf" || extension == ".glb") return read_gltf(path, builder);
+  if (extension == ".obj") return read_obj(path, builder);
+  if (extension == ".ply") return read_ply(path, builder);
+  if (extension == ".stl") return read_stl(path, builder);
+  if (extension == ".off") return read_off(path, builder);
+  throw Failure(Exit::kUnsupported, path.string(),
+                "is of no format known here, give .gltf, .glb, .obj, .ply, .stl or .off");
+}
+
+}  // namespace
+
+Mesh import_meshes(std::span<const std::filesystem::path> inputs, const ImportOptions& options) {
+  Budget budget(options.memory_limit);
+  MeshBuilder builder(budget, options.crease_angle_degrees);
+  for (const std::filesystem::path& path : inputs) {
+    const uint64_t before = builder.mesh().primitive_count, rejected_before = builder.mesh().rejected.total();
+    try {
+      read_mesh_file(path, builder);
+    } catch (const std::bad_alloc&) {
+      throw Failure(Exit::kLimit, path.string(), "needs more memory to import than there is, split the mesh");
+    }
+    const uint64_t count = builder.mesh().primitive_count - before;
+    if (count == 0) {
+      throw Failure(Exit::kInvalid, path.string(), "holds no triangle, give a file with a mesh in it");
+    }
+    if (count == builder.mesh().rejected.total() - rejected_before) {
+      builder.note(path.string() + ": none of its triangles can be used");
+    }
+  }
+  return builder.take();
+}
+
+std::array<uint64_t, 2> hash_inputs(std::span<const std::filesystem::path> inputs) {
+  const std::unique_ptr<XXH3_state_t, XXH_errorcode (*)(XXH3_state_t*)> state(XXH3_createState(),
+                                                                              XXH3_freeState);
+  if (!state) throw std::bad_alloc();
+  XXH3_128bits_reset(state.get());
+  const auto add = [&](const std::filesystem::path& path) {
+    Budget budget(0);
+    const std::string bytes = read_file(path, budget);
+    XXH3_128bits_update(state.get(), bytes.data(), bytes.size());
+  };
+  for (const std::filesystem::path& path : inputs) {
+    add(path);
+    if (extension_of(path) != ".gltf") continue;
+    Budget budget(0);
+    for (const std::filesystem::path& buffer : external_buffers(path, budget)) add(buffer);
+  }
+  const XXH128_hash_t hash = XXH3_128bits_digest(state.get());
+  return {hash.low64, hash.high64};
+}
+
+}  // namespace lsp

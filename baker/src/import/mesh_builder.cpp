@@ -1,0 +1,273 @@
+#include "import/mesh_builder.h"
+
+#include <bit>
+#include <cmath>
+#include <cstring>
+
+#include "import/source_file.h"
+#include "lsp/program.h"
+
+namespace lsp {
+namespace {
+
+// Corners that share one position and are looked at when smoothing; beyond, normals stay flat. A bound on the
+// time a mesh with a million triangles in one point may take.
+constexpr size_t kMaxSmoothValence = 512;
+
+// A triangle's area below this part of its longest edge squared is no area.
+constexpr double kDegenerateArea = 1e-14;
+
+bool is_finite(const glm::vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+
+// Unit vector along `v`, or zero where it has no direction; safe from over- and underflow.
+glm::dvec3 direction_of(const glm::dvec3& v) {
+  const double largest = std::max(std::abs(v.x), std::max(std::abs(v.y), std::abs(v.z)));
+  if (!(largest > 0) || !std::isfinite(largest)) return glm::dvec3(0);
+  const glm::dvec3 scaled = v / largest;
+  return scaled / std::sqrt(glm::dot(scaled, scaled));
+}
+
+glm::dvec3 geometric_normal(const glm::vec3& a, const glm::vec3& b, const glm::vec3& c) {
+  return direction_of(glm::cross(glm::dvec3(b) - glm::dvec3(a), glm::dvec3(c) - glm::dvec3(a)));
+}
+
+uint64_t hash_of(const glm::vec3& p) {
+  // Finalizer of MurmurHash3 over the three bit patterns.
+  uint64_t h = uint64_t(std::bit_cast<uint32_t>(p.x)) << 32 | std::bit_cast<uint32_t>(p.y);
+  h ^= uint64_t(std::bit_cast<uint32_t>(p.z)) * 0x9E3779B97F4A7C15ull;
+  h = (h ^ h >> 33) * 0xFF51AFD7ED558CCDull;
+  h = (h ^ h >> 33) * 0xC4CEB9FE1A85EC53ull;
+  return h ^ h >> 33;
+}
+
+}  // namespace
+
+MeshBuilder::MeshBuilder(Budget& budget, float crease_angle_degrees)
+    : budget_(budget), crease_cosine_(std::cos(crease_angle_degrees * 3.14159265358979f / 180.0f)) {}
+
+void MeshBuilder::check_count(const std::string& file, uint64_t more) const {
+  if (more > uint64_t{0xFFFFFFFE} - mesh_.primitive_count) {
+    throw Failure(Exit::kLimit, file, "holds more than 2^32 - 2 triangles, split the mesh");
+  }
+}
+
+void MeshBuilder::begin(const std::string& file, std::span<const glm::vec3> positions,
+                        uint64_t triangle_count, MissingNormals missing) {
+  check_count(file, triangle_count);
+  // Kept for good: indices, number, normals, material. For a while: the welding, and a vector's old half
+  // while it grows.
+  constexpr uint64_t kTriangleBytes =
+      sizeof(glm::uvec3) + sizeof(uint32_t) + 3 * sizeof(glm::vec3) + sizeof(uint32_t);
+  budget_.charge(file, triangle_count, kTriangleBytes * 3 / 2);
+  budget_.charge(file, positions.size(), sizeof(uint32_t) + sizeof(glm::vec3) * 3 / 2);
+  file_ = file;
+  positions_ = positions;
+  missing_ = missing;
+  group_begin_ = mesh_.triangles.size();
+  unsmooth_.clear();
+  unusable_normals_ = 0;
+  welded_.assign(positions.size(), kNoIndex);
+  // Many small groups must not each move the whole mesh.
+  const auto reserve = [&](auto& vector) {
+    const size_t wanted = vector.size() + triangle_count;
+    if (wanted > vector.capacity()) vector.reserve(std::max(wanted, vector.capacity() * 3 / 2));
+  };
+  reserve(mesh_.triangles);
+  reserve(mesh_.primitives);
+  reserve(mesh_.normals);
+  reserve(mesh_.material_ids);
+}
+
+void MeshBuilder::add(const glm::uvec3& corners, const glm::vec3* normals, uint32_t material) {
+  const auto primitive = uint32_t(mesh_.primitive_count++);
+  const size_t count = positions_.size();
+  if (corners.x >= count || corners.y >= count || corners.z >= count) {
+    ++mesh_.rejected.out_of_range;
+    return;
+  }
+  const glm::vec3 a = positions_[corners.x], b = positions_[corners.y], c = positions_[corners.z];
+  if (!is_finite(a) || !is_finite(b) || !is_finite(c)) {
+    ++mesh_.rejected.non_finite;
+    return;
+  }
+  const glm::dvec3 ab = glm::dvec3(b) - glm::dvec3(a), ac = glm::dvec3(c) - glm::dvec3(a);
+  const glm::dvec3 bc = glm::dvec3(c) - glm::dvec3(b);
+  const glm::dvec3 cross = glm::cross(ab, ac);
+  const double longest = std::max(glm::dot(ab, ab), std::max(glm::dot(ac, ac), glm::dot(bc, bc)));
+  if (a == b || b == c || a == c || 0.5 * std::sqrt(glm::dot(cross, cross)) < kDegenerateArea * longest) {
+    ++mesh_.rejected.degenerate;
+    return;
+  }
+
+  glm::uvec3 indices;
+  for (int i = 0; i < 3; ++i) {
+    uint32_t& known = welded_[corners[i]];
+    if (known == kNoIndex) known = weld(positions_[corners[i]]);
+    indices[i] = known;
+  }
+
+  std::array<glm::vec3, 3> unit;
+  bool complete = true;
+  for (int i = 0; i < 3; ++i) {
+    // A NaN in all components says "none"; the sentinel survives to smooth_missing().
+    const bool present =
+        normals && !(std::isnan(normals[i].x) && std::isnan(normals[i].y) && std::isnan(normals[i].z));
+    if (present) {
+      glm::dvec3 direction = is_finite(normals[i]) ? direction_of(glm::dvec3(normals[i])) : glm::dvec3(0);
+      if (direction == glm::dvec3(0)) {
+        ++unusable_normals_;
+        direction = direction_of(cross);
+      }
+      unit[i] = glm::vec3(direction);
+    } else if (missing_ == MissingNormals::kFlat) {
+      unit[i] = glm::vec3(direction_of(cross));
+    } else {
+      unit[i] = glm::vec3(std::numeric_limits<float>::quiet_NaN());
+      complete = false;
+    }
+  }
+  if (!complete) unsmooth_.push_back(uint32_t(mesh_.triangles.size()));
+  mesh_.triangles.push_back(indices);
+  mesh_.primitives.push_back(primitive);
+  mesh_.normals.push_back(unit);
+  mesh_.material_ids.push_back(material);
+}
+
+void MeshBuilder::end() {
+  if (!unsmooth_.empty()) smooth_missing();
+  if (unusable_normals_) {
+    note(file_ + ": " + std::to_string(unusable_normals_) +
+         " corner normals are zero or not finite, the triangle's own takes their place");
+  }
+  budget_.release(positions_.size() * sizeof(uint32_t));
+  positions_ = {};
+}
+
+uint32_t MeshBuilder::weld(const glm::vec3& position) {
+  if (2 * (mesh_.positions.size() + 1) > slots_.size()) grow_slots();
+  const glm::vec3 p = position + 0.0f;  // -0 becomes +0
+  const size_t mask = slots_.size() - 1;
+  for (size_t slot = hash_of(p) & mask;; slot = (slot + 1) & mask) {
+    if (slots_[slot] == kNoIndex) {
+      slots_[slot] = uint32_t(mesh_.positions.size());
+      mesh_.positions.push_back(p);
+      return slots_[slot];
+    }
+    if (mesh_.positions[slots_[slot]] == p) return slots_[slot];
+  }
+}
+
+void MeshBuilder::grow_slots() {
+  const size_t size = slots_.empty() ? 1024 : slots_.size() * 2;
+  budget_.charge(file_, size, sizeof(uint32_t));
+  budget_.release(slots_.size() * sizeof(uint32_t));
+  slots_.assign(size, kNoIndex);
+  for (uint32_t i = 0; i < mesh_.positions.size(); ++i) {
+    size_t slot = hash_of(mesh_.positions[i]) & (size - 1);
+    while (slots_[slot] != kNoIndex) slot = (slot + 1) & (size - 1);
+    slots_[slot] = i;
+  }
+}
+
+// Angle-weighted normals (Thuermer and Wuethrich 1998): a corner's normal is the sum of the normals of the
+// faces around its position, each by its angle there, over those within the crease angle of its own face.
+void MeshBuilder::smooth_missing() {
+  struct Corner {
+    glm::vec3 face_normal;
+    float angle;
+  };
+  const size_t first = group_begin_, count = mesh_.triangles.size() - first;
+  const uint64_t temporary =
+      count * 3 * (sizeof(Corner) + sizeof(uint32_t)) + (mesh_.positions.size() + 1) * sizeof(uint32_t);
+  budget_.charge(file_, temporary);
+
+  // Corners sorted by position: those of position p are by_position[begins[p] .. begins[p + 1]).
+  std::vector<uint32_t> begins(mesh_.positions.size() + 1, 0);
+  for (size_t t = first; t < first + count; ++t) {
+    for (int i = 0; i < 3; ++i) ++begins[mesh_.triangles[t][i] + 1];
+  }
+  for (size_t p = 1; p < begins.size(); ++p) begins[p] += begins[p - 1];
+  std::vector<Corner> by_position(count * 3);
+  std::vector<uint32_t> place(count * 3);
+  {
+    std::vector<uint32_t> next(begins.begin(), begins.end() - 1);
+    for (size_t t = 0; t < count; ++t) {
+      const glm::uvec3& triangle = mesh_.triangles[first + t];
+      const glm::vec3 p[3] = {mesh_.positions[triangle.x], mesh_.positions[triangle.y],
+                              mesh_.positions[triangle.z]};
+      const glm::vec3 normal(geometric_normal(p[0], p[1], p[2]));
+      for (int i = 0; i < 3; ++i) {
+        const glm::dvec3 u = direction_of(glm::dvec3(p[(i + 1) % 3]) - glm::dvec3(p[i]));
+        const glm::dvec3 v = direction_of(glm::dvec3(p[(i + 2) % 3]) - glm::dvec3(p[i]));
+        const double sine = std::sqrt(glm::dot(glm::cross(u, v), glm::cross(u, v)));
+        place[3 * t + i] = next[triangle[i]]++;
+        by_position[place[3 * t + i]] = {normal, float(std::atan2(sine, glm::dot(u, v)))};
+      }
+    }
+  }
+
+  uint64_t too_many = 0;
+  for (const uint32_t t : unsmooth_) {
+    for (int i = 0; i < 3; ++i) {
+      glm::vec3& normal = mesh_.normals[t][i];
+      if (!std::isnan(normal.x)) continue;
+      const uint32_t p = mesh_.triangles[t][i];
+      const glm::vec3 own = by_position[place[3 * (t - first) + i]].face_normal;
+      normal = own;
+      if (begins[p + 1] - begins[p] > kMaxSmoothValence) {
+        ++too_many;
+        continue;
+      }
+      glm::dvec3 sum(0);
+      for (uint32_t k = begins[p]; k < begins[p + 1]; ++k) {
+        const Corner& corner = by_position[k];
+        if (glm::dot(corner.face_normal, own) >= crease_cosine_)
+          sum += glm::dvec3(corner.face_normal) * double(corner.angle);
+      }
+      const glm::dvec3 smooth = direction_of(sum);
+      if (smooth != glm::dvec3(0)) normal = glm::vec3(smooth);
+    }
+  }
+  if (too_many) {
+    note(file_ + ": " + std::to_string(too_many) + " corners lie where more than " +
+         std::to_string(kMaxSmoothValence) + " triangles meet, their normals stay flat");
+  }
+  budget_.release(temporary);
+}
+
+uint32_t MeshBuilder::add_material(Material material) {
+  material.name = printable(material.name);
+  const auto bounded = [](float value, float fallback, float high) {
+    return std::isfinite(value) ? std::min(std::max(value, 0.0f), high) : fallback;
+  };
+  constexpr float kLargest = std::numeric_limits<float>::max();
+  for (int i = 0; i < 3; ++i) {
+    material.base_color[i] = bounded(material.base_color[i], 0.8f, 1.0f);
+    material.emission[i] = bounded(material.emission[i], 0.0f, kLargest);
+  }
+  material.opacity = bounded(material.opacity, 1.0f, 1.0f);
+  material.roughness = bounded(material.roughness, 1.0f, 1.0f);
+  material.metallic = bounded(material.metallic, 0.0f, 1.0f);
+  budget_.charge(file_, sizeof(Material) * 2 + material.name.size());
+  mesh_.materials.push_back(std::move(material));
+  return uint32_t(mesh_.materials.size() - 1);
+}
+
+uint32_t MeshBuilder::default_material() {
+  if (default_material_ == kNoIndex) default_material_ = add_material({});
+  return default_material_;
+}
+
+void MeshBuilder::note(const std::string& text) {
+  // A file can give as many reasons for a note as it has lines.
+  constexpr size_t kMaxNotes = 1000;
+  if (noted_.size() < kMaxNotes && noted_.insert(text).second) mesh_.notes.push_back(printable(text));
+}
+
+Mesh MeshBuilder::take() {
+  if (mesh_.materials.empty()) default_material();
+  mesh_.positions.shrink_to_fit();
+  return std::move(mesh_);
+}
+
+}  // namespace lsp

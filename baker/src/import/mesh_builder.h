@@ -1,0 +1,74 @@
+// Collects triangles of all inputs into one Mesh: counts, rejects, welds, and completes normals.
+#pragma once
+
+#include <glm/glm.hpp>
+#include <limits>
+#include <set>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "import/budget.h"
+#include "mesh.h"
+
+namespace lsp {
+
+// An index that refers to nothing.
+inline constexpr uint32_t kNoIndex = 0xFFFFFFFFu;
+
+// What to do at corners for which a file holds no normal.
+enum class MissingNormals {
+  kFlat,    // the triangle's own
+  kSmooth,  // angle-weighted over the faces around an equal position, up to the crease angle
+};
+
+class MeshBuilder {
+ public:
+  MeshBuilder(Budget& budget, float crease_angle_degrees);
+
+  // Starts a group of triangles that index `positions` (which must outlive the group); `file` names it in
+  // errors and notes, `triangle_count` is what it will add (charged to the budget at once).
+  void begin(const std::string& file, std::span<const glm::vec3> positions, uint64_t triangle_count,
+             MissingNormals missing);
+
+  // Counts one triangle, and keeps it unless it is to be rejected. `normals` are the file's at the corners:
+  // any length, NaN where the file has none; null where it has none for all three.
+  void add(const glm::uvec3& corners, const glm::vec3* normals, uint32_t material);
+
+  // Ends the group; corners still without a normal get one.
+  void end();
+
+  uint32_t add_material(Material material);
+  // The material of triangles to which no file gives one; made on first use.
+  uint32_t default_material();
+  void note(const std::string& text);
+  Budget& budget() { return budget_; }
+
+  // Throws Failure kLimit where `more` triangles would not fit the 32-bit primitive numbers.
+  void check_count(const std::string& file, uint64_t more) const;
+
+  const Mesh& mesh() const { return mesh_; }
+  Mesh take();
+
+ private:
+  uint32_t weld(const glm::vec3& position);
+  void grow_slots();
+  void smooth_missing();
+
+  Budget& budget_;
+  float crease_cosine_;
+  Mesh mesh_;
+  std::set<std::string> noted_;
+  uint32_t default_material_ = kNoIndex;
+
+  std::string file_;
+  std::span<const glm::vec3> positions_;
+  MissingNormals missing_ = MissingNormals::kFlat;
+  std::vector<uint32_t> welded_;    // per position of the group: its index in the mesh, or kNoIndex
+  std::vector<uint32_t> slots_;     // open addressing over mesh_.positions
+  size_t group_begin_ = 0;          // first kept triangle of the group
+  std::vector<uint32_t> unsmooth_;  // kept triangles of the group with a corner without a normal
+  uint64_t unusable_normals_ = 0;   // of the group: present but zero or not finite
+};
+
+}  // namespace lsp

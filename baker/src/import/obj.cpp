@@ -1,0 +1,188 @@
+// Wavefront OBJ: polygons, normals, materials. Lines, points, curves and surfaces hold no triangles.
+#include <map>
+#include <unordered_map>
+
+#include "import/mtl.h"
+#include "import/polygons.h"
+#include "import/readers.h"
+#include "import/source_file.h"
+#include "import/text.h"
+#include "lsp/program.h"
+
+namespace lsp {
+namespace {
+
+constexpr std::string_view kDefaultMaterial{};
+
+class ObjReader {
+ public:
+  ObjReader(const std::filesystem::path& path, MeshBuilder& builder)
+      : path_(path), file_(path.string()), builder_(builder) {}
+
+  void read() {
+    const std::string text = read_text(path_, builder_.budget());
+    // From above: a face "f 1 1 1" is 8 bytes and becomes 32, in vectors that grow by doubling.
+    builder_.budget().charge(file_, text.size(), 8);
+    std::string_view rest = text, line;
+    std::string joined;
+    while (take_line(rest, line)) {
+      if (!line.empty() && line.back() == '\\') {
+        joined.clear();
+        do {
+          joined.append(line.substr(0, line.size() - 1));
+          joined += ' ';
+        } while (take_line(rest, line) && !line.empty() && line.back() == '\\');
+        if (line.empty() || line.back() != '\\') joined.append(line);
+        line = joined;
+      }
+      read_line(line);
+    }
+    if (soup_.positions.size() >= kNoIndex) {
+      throw Failure(Exit::kLimit, file_, "holds more than 2^32 - 2 vertices, split the mesh");
+    }
+    resolve_materials();
+    if (other_elements_) {
+      builder_.note(file_ + ": " + std::to_string(other_elements_) +
+                    " lines, points, curves or surfaces hold no triangle");
+    }
+    if (colored_) builder_.note(file_ + ": vertex colours are not used");
+    add_polygons(file_, soup_, builder_);
+  }
+
+ private:
+  void read_line(std::string_view line) {
+    std::string_view word;
+    if (!take_word(line, word)) return;
+    if (word == "v") {
+      const glm::vec3 position = read_vector(line);
+      soup_.positions.push_back(position);
+      std::string_view more;
+      colored_ = colored_ || (take_word(line, more) && take_word(line, more));
+    } else if (word == "vn") {
+      soup_.normals.push_back(read_vector(line));
+    } else if (word == "f" || word == "fo") {
+      read_face(line);
+    } else if (word == "usemtl") {
+      use_material(trim(line));
+    } else if (word == "mtllib") {
+      libraries_.emplace_back(trim(line));
+    } else if (word == "l" || word == "p" || word == "curv" || word == "curv2" || word == "surf") {
+      ++other_elements_;
+    }
+  }
+
+  // What is not there is NaN: a vertex that takes part in a face then has the face refused by name.
+  static glm::vec3 read_vector(std::string_view& line) {
+    glm::vec3 vector(std::numeric_limits<float>::quiet_NaN());
+    std::string_view word;
+    for (int i = 0; i < 3 && take_word(line, word); ++i) vector[i] = float(number_of(word));
+    return vector;
+  }
+
+  // An index counts from 1, or from the end where it is negative. kNoIndex for what refers to nothing yet
+  // cannot be told apart here from a vertex further down, which is permitted.
+  static uint32_t resolve(std::string_view word, size_t count) {
+    int64_t index = 0;
+    if (!integer_of(word, index)) return kNoIndex;
+    if (index < 0) index += int64_t(count) + 1;
+    return index > 0 && index < int64_t{kNoIndex} ? uint32_t(index - 1) : kNoIndex;
+  }
+
+  void read_face(std::string_view line) {
+    std::string_view word;
+    while (take_word(line, word)) {
+      if (word.front() == '#') break;
+      const size_t slash = word.find('/');
+      soup_.corners.push_back(resolve(word.substr(0, slash), soup_.positions.size()));
+      uint32_t normal = kNoIndex;
+      if (slash != word.npos) {
+        const size_t second = word.find('/', slash + 1);
+        if (second != word.npos) normal = resolve(word.substr(second + 1), soup_.normals.size());
+      }
+      if (normal != kNoIndex || !soup_.corner_normals.empty()) {
+        soup_.corner_normals.resize(soup_.corners.size() - 1, kNoIndex);
+        soup_.corner_normals.push_back(normal);
+      }
+    }
+    if (soup_.end_face()) soup_.materials.push_back(material_);
+  }
+
+  void use_material(std::string_view name) {
+    const auto [at, fresh] = names_.try_emplace(std::string(name), uint32_t(used_.size()));
+    if (fresh) used_.push_back(at->first);
+    material_ = at->second;
+  }
+
+  // A mtllib line names one file, which may hold spaces, or several.
+  void read_library(const std::string& words, std::map<std::string, Material>& materials) {
+    const auto try_file = [&](std::string name) {
+      for (char& c : name) {
+        if (c == '\\') c = '/';
+      }
+      std::error_code error;
+      const std::filesystem::path beside = path_.parent_path() / name;
+      // Exporters write the path of their own machine; the file itself is usually beside the mesh.
+      for (const auto& path : {beside, path_.parent_path() / std::filesystem::path(name).filename()}) {
+        if (!std::filesystem::is_regular_file(path, error)) continue;
+        read_mtl(path, builder_.budget(), materials);
+        return true;
+      }
+      return false;
+    };
+    if (words.empty() || words.find('\0') != words.npos || try_file(words)) return;
+    std::string_view rest = words, word;
+    while (take_word(rest, word)) {
+      if (!try_file(std::string(word))) {
+        builder_.note(file_ + ": the material library " + std::string(word) + " is not there");
+      }
+    }
+  }
+
+  // Replaces the numbers of names that faces carry by the builder's materials.
+  void resolve_materials() {
+    std::map<std::string, Material> defined;
+    constexpr size_t kMaxLibraries = 1000;
+    std::map<std::string, bool> read;
+    for (const std::string& library : libraries_) {
+      if (read.size() < kMaxLibraries && read.try_emplace(library, true).second)
+        read_library(library, defined);
+    }
+    std::vector<uint32_t> ids(used_.size(), kNoIndex);
+    uint64_t missing = 0;
+    for (uint32_t& material : soup_.materials) {
+      uint32_t& id = ids[material];
+      if (id == kNoIndex) {
+        const std::string& name = used_[material];
+        const auto found = defined.find(name);
+        Material fallback;
+        fallback.name = name;
+        if (found == defined.end() && !name.empty()) ++missing;
+        id = found != defined.end() ? builder_.add_material(found->second)
+             : name.empty()         ? builder_.default_material()
+                                    : builder_.add_material(fallback);
+      }
+      material = id;
+    }
+    if (missing) {
+      builder_.note(file_ + ": " + std::to_string(missing) +
+                    " materials are named but not defined, they are taken as grey");
+    }
+  }
+
+  const std::filesystem::path& path_;
+  const std::string file_;
+  MeshBuilder& builder_;
+  PolygonSoup soup_;
+  std::unordered_map<std::string, uint32_t> names_{{std::string(kDefaultMaterial), 0}};
+  std::vector<std::string> used_{std::string(kDefaultMaterial)};  // names, by the number in soup_.materials
+  uint32_t material_ = 0;
+  std::vector<std::string> libraries_;
+  uint64_t other_elements_ = 0;
+  bool colored_ = false;
+};
+
+}  // namespace
+
+void read_obj(const std::filesystem::path& path, MeshBuilder& builder) { ObjReader(path, builder).read(); }
+
+}  // namespace lsp

@@ -1,0 +1,160 @@
+// Geomview's OFF: [ST][C][N][4]OFF, ASCII. Colours and texture coordinates are skipped.
+#include "import/polygons.h"
+#include "import/readers.h"
+#include "import/source_file.h"
+#include "import/text.h"
+#include "lsp/program.h"
+
+namespace lsp {
+namespace {
+
+// Words of the text in order; comments are skipped, and the end of a line can be asked for.
+class Words {
+ public:
+  explicit Words(std::string_view text) : text_(text) {}
+
+  bool next(std::string_view& word) {
+    while (!take_word(line_, word)) {
+      if (!next_line()) return false;
+    }
+    return true;
+  }
+  // Whether words are left on the line of the last one.
+  bool line_goes_on() const { return !trim(line_).empty(); }
+  // True where the line held words that are now skipped.
+  bool skip_line() {
+    const bool held = line_goes_on();
+    line_ = {};
+    return held;
+  }
+  void put_back(std::string_view rest_of_word) {
+    line_ = {rest_of_word.data(), size_t(line_.data() + line_.size() - rest_of_word.data())};
+  }
+
+ private:
+  bool next_line() {
+    if (!take_line(text_, line_)) return false;
+    line_ = line_.substr(0, line_.find('#'));
+    return true;
+  }
+  std::string_view text_, line_;
+};
+
+class OffReader {
+ public:
+  OffReader(const std::string& file, std::string_view text, MeshBuilder& builder)
+      : file_(file), words_(text), text_bytes_(text.size()), builder_(builder) {}
+
+  void read() {
+    read_header();
+    const uint64_t vertex_count = read_count("vertices"), face_count = read_count("faces");
+    words_.skip_line();  // the number of edges, often missing and never needed
+    // A vertex takes at least six bytes, a face four; the vectors below grow by doubling.
+    if (vertex_count > text_bytes_ / 6 + 1 || face_count > text_bytes_ / 2 + 1) {
+      throw Failure(Exit::kInvalid, file_,
+                    "declares more vertices or faces than its bytes can hold: export it again");
+    }
+    builder_.budget().charge(file_, text_bytes_, 8);
+    for (uint64_t i = 0; i < vertex_count; ++i) read_vertex();
+    for (uint64_t i = 0; i < face_count; ++i) read_face();
+    if (colored_) builder_.note(file_ + ": colours are not used");
+    soup_.material = builder_.default_material();
+    add_polygons(file_, soup_, builder_);
+  }
+
+ private:
+  std::string_view word() {
+    std::string_view word;
+    if (!words_.next(word))
+      throw Failure(Exit::kInvalid, file_, "ends too early, it is cut short: export or copy it again");
+    return word;
+  }
+
+  uint64_t read_count(const char* what) {
+    int64_t value = 0;
+    if (!integer_of(word(), value) || value < 0) {
+      throw Failure(Exit::kInvalid, file_,
+                    std::string("has no number of ") + what + " where one belongs: export it again");
+    }
+    return uint64_t(value);
+  }
+
+  void read_header() {
+    std::string_view first = word();
+    const std::string_view whole = first;
+    const auto take = [&](std::string_view prefix) {
+      if (first.substr(0, prefix.size()) != prefix) return false;
+      first.remove_prefix(prefix.size());
+      return true;
+    };
+    take("ST");
+    take("C");
+    has_normals_ = take("N");
+    homogeneous_ = take("4");
+    if (take("n")) {
+      throw Failure(Exit::kUnsupported, file_, "is an nOFF file, of any dimension; give one with three");
+    }
+    if (!take("OFF")) {
+      // The keyword may be left out; the counts then come first.
+      int64_t number = 0;
+      if (!integer_of(whole, number))
+        throw Failure(Exit::kInvalid, file_, "does not start as an OFF file: export it again");
+      has_normals_ = homogeneous_ = false;
+      first = whole;
+    }
+    words_.put_back(first);  // "OFF8 6 12" occurs
+    if (!first.empty()) return;
+    if (words_.line_goes_on()) {
+      Words ahead = words_;
+      std::string_view next;
+      ahead.next(next);
+      if (equals_ignoring_case(next, "BINARY")) {
+        throw Failure(Exit::kUnsupported, file_, "is a binary OFF file, export it as text");
+      }
+    }
+  }
+
+  void read_vertex() {
+    glm::dvec3 position;
+    for (int i = 0; i < 3; ++i) position[i] = number_of(word());
+    if (homogeneous_) position /= number_of(word());
+    soup_.positions.emplace_back(position);
+    if (has_normals_) {
+      glm::vec3 normal;
+      for (int i = 0; i < 3; ++i) normal[i] = float(number_of(word()));
+      soup_.normals.push_back(normal);
+    }
+    colored_ = words_.skip_line() || colored_;
+  }
+
+  // "n i1 .. in", broken over lines as one likes, and a colour up to the end of the last line.
+  void read_face() {
+    const uint64_t count = read_count("corners");
+    for (uint64_t i = 0; i < count; ++i) {
+      int64_t index = -1;
+      const bool good = integer_of(word(), index) && index >= 0 && index < int64_t{kNoIndex};
+      soup_.corners.push_back(good ? uint32_t(index) : kNoIndex);
+      if (has_normals_) soup_.corner_normals.push_back(soup_.corners.back());
+    }
+    colored_ = words_.skip_line() || colored_;
+    soup_.end_face();
+  }
+
+  const std::string file_;
+  Words words_;
+  const uint64_t text_bytes_;
+  MeshBuilder& builder_;
+  PolygonSoup soup_;
+  bool has_normals_ = false;
+  bool homogeneous_ = false;
+  bool colored_ = false;
+};
+
+}  // namespace
+
+void read_off(const std::filesystem::path& path, MeshBuilder& builder) {
+  const std::string text = read_text(path, builder.budget());
+  OffReader(path.string(), text, builder).read();
+}
+
+}  // namespace lsp

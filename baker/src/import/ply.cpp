@@ -1,0 +1,394 @@
+// PLY, ASCII and binary of either byte order: vertex x y z, nx ny nz; face vertex_indices (or vertex_index);
+// tristrips. Every other element and property is skipped by its type.
+#include <algorithm>
+#include <bit>
+#include <cstring>
+
+#include "import/polygons.h"
+#include "import/readers.h"
+#include "import/source_file.h"
+#include "import/text.h"
+#include "lsp/program.h"
+
+namespace lsp {
+namespace {
+
+enum class Type { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat32, kFloat64 };
+enum class Encoding { kAscii, kLittle, kBig };
+
+struct Property {
+  std::string name;
+  Type type = Type::kFloat32;
+  bool is_list = false;
+  Type count_type = Type::kUint8;
+};
+
+struct Element {
+  std::string name;
+  uint64_t count = 0;
+  std::vector<Property> properties;
+};
+
+size_t size_of(Type type) {
+  switch (type) {
+    case Type::kInt8:
+    case Type::kUint8:
+      return 1;
+    case Type::kInt16:
+    case Type::kUint16:
+      return 2;
+    case Type::kFloat64:
+      return 8;
+    default:
+      return 4;
+  }
+}
+
+bool type_of(std::string_view word, Type& type) {
+  constexpr std::pair<std::string_view, Type> kNames[] = {
+      {"char", Type::kInt8},      {"int8", Type::kInt8},       {"uchar", Type::kUint8},
+      {"uint8", Type::kUint8},    {"short", Type::kInt16},     {"int16", Type::kInt16},
+      {"ushort", Type::kUint16},  {"uint16", Type::kUint16},   {"int", Type::kInt32},
+      {"int32", Type::kInt32},    {"uint", Type::kUint32},     {"uint32", Type::kUint32},
+      {"float", Type::kFloat32},  {"float32", Type::kFloat32}, {"double", Type::kFloat64},
+      {"float64", Type::kFloat64}};
+  for (const auto& [name, value] : kNames) {
+    if (word == name) {
+      type = value;
+      return true;
+    }
+  }
+  return false;
+}
+
+[[noreturn]] void fail(const std::string& file, const std::string& what) {
+  throw Failure(Exit::kInvalid, file, what + ": export or copy it again");
+}
+
+struct Header {
+  Encoding encoding = Encoding::kAscii;
+  std::vector<Element> elements;
+};
+
+Header read_header(const std::string& file, std::string_view& text) {
+  Header header;
+  std::string_view line, word;
+  if (!take_line(text, line) || trim(line) != "ply") fail(file, "does not start as a PLY file");
+  bool encoded = false;
+  while (take_line(text, line)) {
+    if (!take_word(line, word) || word == "comment" || word == "obj_info") continue;
+    if (word == "end_header") {
+      if (!encoded) fail(file, "names no format in its header");
+      return header;
+    }
+    if (word == "format") {
+      take_word(line, word);
+      if (word == "ascii") {
+        header.encoding = Encoding::kAscii;
+      } else if (word == "binary_little_endian") {
+        header.encoding = Encoding::kLittle;
+      } else if (word == "binary_big_endian") {
+        header.encoding = Encoding::kBig;
+      } else {
+        throw Failure(Exit::kUnsupported, file,
+                      "has the format " + printable(word) + ", which PLY does not know");
+      }
+      encoded = true;
+    } else if (word == "element") {
+      Element element;
+      int64_t count = -1;
+      if (take_word(line, word)) element.name = word;
+      if (!take_word(line, word) || !integer_of(word, count) || count < 0) {
+        fail(file, "has an element without a number in its header");
+      }
+      element.count = uint64_t(count);
+      header.elements.push_back(std::move(element));
+    } else if (word == "property") {
+      Property property;
+      take_word(line, word);
+      property.is_list = word == "list";
+      bool good = !header.elements.empty();
+      if (property.is_list) {
+        good = good && take_word(line, word) && type_of(word, property.count_type) && take_word(line, word);
+      }
+      if (!good || !type_of(word, property.type) || !take_word(line, word)) {
+        fail(file, "has a property without a known type in its header");
+      }
+      property.name = word;
+      header.elements.back().properties.push_back(std::move(property));
+    } else {
+      fail(file, "has the unknown word " + printable(word.substr(0, 40)) + " in its header");
+    }
+  }
+  fail(file, "has a header without an end");
+}
+
+// Values of the body one after the other. Numbers of an ASCII body are separated by any white space; line
+// ends mean nothing, so that lists may be broken over lines.
+class Body {
+ public:
+  Body(const std::string& file, std::string_view bytes, Encoding encoding)
+      : file_(file), bytes_(bytes), encoding_(encoding) {}
+
+  size_t left() const { return bytes_.size(); }
+
+  double number(Type type) {
+    if (encoding_ == Encoding::kAscii) return number_of(word());
+    switch (type) {
+      case Type::kInt8:
+        return double(binary<int8_t>());
+      case Type::kUint8:
+        return double(binary<uint8_t>());
+      case Type::kInt16:
+        return double(binary<int16_t>());
+      case Type::kUint16:
+        return double(binary<uint16_t>());
+      case Type::kInt32:
+        return double(binary<int32_t>());
+      case Type::kUint32:
+        return double(binary<uint32_t>());
+      case Type::kFloat32:
+        return double(binary<float>());
+      default:
+        return binary<double>();
+    }
+  }
+
+  // -1 for what is no whole number of 0 or more (strips end with -1).
+  int64_t index(Type type) {
+    if (encoding_ == Encoding::kAscii) {
+      const std::string_view text = word();
+      int64_t value = -1;
+      if (integer_of(text, value)) return value;
+      return whole(number_of(text));
+    }
+    return whole(number(type));
+  }
+
+  void skip(const Property& property) {
+    const uint64_t count = property.is_list ? list_length(property) : 1;
+    if (encoding_ != Encoding::kAscii) {
+      take(count * size_of(property.type));
+    } else {
+      for (uint64_t i = 0; i < count; ++i) word();
+    }
+  }
+
+  uint64_t list_length(const Property& property) {
+    const int64_t count = index(property.count_type);
+    const size_t least = encoding_ == Encoding::kAscii ? 1 : size_of(property.type);
+    if (count < 0 || uint64_t(count) > left() / least)
+      fail(file_, "has a list longer than what is left of it");
+    return uint64_t(count);
+  }
+
+ private:
+  static int64_t whole(double value) {
+    return value >= 0 && value < 9e15 && value == std::floor(value) ? int64_t(value) : -1;
+  }
+
+  std::string_view word() {
+    size_t begin = 0;
+    const auto is_space = [](char c) { return is_blank(c) || is_line_end(c); };
+    while (begin < bytes_.size() && is_space(bytes_[begin])) ++begin;
+    size_t end = begin;
+    while (end < bytes_.size() && !is_space(bytes_[end])) ++end;
+    const std::string_view found = bytes_.substr(begin, end - begin);
+    if (found.empty()) fail(file_, "holds less than its header says");
+    bytes_.remove_prefix(end);
+    return found;
+  }
+
+  std::string_view take(uint64_t count) {
+    if (count > bytes_.size()) fail(file_, "holds less than its header says");
+    const std::string_view taken = bytes_.substr(0, count);
+    bytes_.remove_prefix(count);
+    return taken;
+  }
+
+  template <typename T>
+  T binary() {
+    char raw[sizeof(T)];
+    std::memcpy(raw, take(sizeof(T)).data(), sizeof(T));
+    static_assert(std::endian::native == std::endian::little);
+    if (encoding_ == Encoding::kBig) std::reverse(raw, raw + sizeof(T));
+    T value;
+    std::memcpy(&value, raw, sizeof(T));
+    return value;
+  }
+
+  const std::string& file_;
+  std::string_view bytes_;
+  const Encoding encoding_;
+};
+
+class PlyReader {
+ public:
+  PlyReader(const std::string& file, Body& body, MeshBuilder& builder)
+      : file_(file), body_(body), builder_(builder) {}
+
+  void read(const Header& header) {
+    // The tightest list holds an index in one byte; it becomes four in a vector that grows by doubling.
+    builder_.budget().charge(file_, body_.left(), 8);
+    for (const Element& element : header.elements) {
+      has_normals_ = has_normals_ || (element.name == "vertex" && holds_normals(element));
+    }
+    for (const Element& element : header.elements) {
+      check_size(element, header.encoding);
+      if (element.name == "vertex") {
+        read_vertices(element);
+      } else if (element.name == "face") {
+        read_faces(element, false);
+      } else if (element.name == "tristrips") {
+        read_faces(element, true);
+      } else {
+        skip(element);
+      }
+    }
+    if (colored_) builder_.note(file_ + ": colours are not used");
+    soup_.material = builder_.default_material();
+    add_polygons(file_, soup_, builder_);
+  }
+
+ private:
+  static bool holds_normals(const Element& element) {
+    int found = 0;
+    for (const Property& property : element.properties) {
+      found += !property.is_list && (property.name == "nx" || property.name == "ny" || property.name == "nz");
+    }
+    return found >= 3;
+  }
+
+  // So that a header cannot make the reader loop for ages over nothing.
+  void check_size(const Element& element, Encoding encoding) {
+    uint64_t least = 0;
+    for (const Property& property : element.properties) {
+      least +=
+          encoding == Encoding::kAscii ? 2 : size_of(property.is_list ? property.count_type : property.type);
+    }
+    if (least > 0 && element.count > (body_.left() + 1) / least) {
+      fail(file_, "declares " + std::to_string(element.count) + " of element " + printable(element.name) +
+                      " and is too short for them");
+    }
+  }
+
+  void skip(const Element& element) {
+    if (element.properties.empty()) return;
+    for (uint64_t i = 0; i < element.count; ++i) {
+      for (const Property& property : element.properties) body_.skip(property);
+    }
+  }
+
+  void read_vertices(const Element& element) {
+    // Where each property goes: 0..2 position, 3..5 normal, -1 nowhere.
+    constexpr std::string_view kTargets[] = {"x", "y", "z", "nx", "ny", "nz"};
+    std::vector<int> targets;
+    int seen = 0;
+    for (const Property& property : element.properties) {
+      int target = -1;
+      for (int i = 0; i < 6; ++i) {
+        if (property.name == kTargets[i] && !property.is_list && !(seen >> i & 1)) target = i;
+      }
+      if (target >= 0) seen |= 1 << target;
+      targets.push_back(target);
+      colored_ = colored_ || property.name == "red" || property.name == "diffuse_red";
+    }
+    if (element.count > 0 && (seen & 7) != 7) fail(file_, "has vertices without x, y and z");
+    if (element.count >= kNoIndex - soup_.positions.size()) {
+      throw Failure(Exit::kLimit, file_, "holds more than 2^32 - 2 vertices, split the mesh");
+    }
+    soup_.positions.reserve(element.count);
+    if (has_normals_) soup_.normals.reserve(element.count);
+    const size_t count = element.properties.size();
+    for (uint64_t i = 0; i < element.count; ++i) {
+      glm::vec3 vectors[2] = {};
+      for (size_t k = 0; k < count; ++k) {
+        if (targets[k] < 0) {
+          body_.skip(element.properties[k]);
+        } else {
+          vectors[targets[k] / 3][targets[k] % 3] = float(body_.number(element.properties[k].type));
+        }
+      }
+      soup_.positions.push_back(vectors[0]);
+      if (has_normals_) soup_.normals.push_back(vectors[1]);
+    }
+  }
+
+  void read_faces(const Element& element, bool strips) {
+    size_t list = element.properties.size();
+    for (size_t k = 0; k < element.properties.size(); ++k) {
+      const Property& property = element.properties[k];
+      if (property.is_list && (property.name == "vertex_indices" || property.name == "vertex_index"))
+        list = k;
+      colored_ = colored_ || property.name == "red" || property.name == "diffuse_red";
+    }
+    if (list == element.properties.size()) return skip(element);
+    std::vector<uint32_t> strip;
+    for (uint64_t i = 0; i < element.count; ++i) {
+      for (size_t k = 0; k < element.properties.size(); ++k) {
+        const Property& property = element.properties[k];
+        if (k != list) {
+          body_.skip(property);
+          continue;
+        }
+        const uint64_t length = body_.list_length(property);
+        strip.clear();
+        for (uint64_t c = 0; c < length; ++c) {
+          const int64_t index = body_.index(property.type);
+          if (strips && index < 0) {
+            end_strip(strip);
+            continue;
+          }
+          const uint32_t corner = index >= 0 && index < int64_t{kNoIndex} ? uint32_t(index) : kNoIndex;
+          if (strips) {
+            strip.push_back(corner);
+          } else {
+            add_corner(corner);
+          }
+        }
+        if (strips) {
+          end_strip(strip);
+        } else {
+          soup_.end_face();
+        }
+      }
+    }
+  }
+
+  void add_corner(uint32_t corner) {
+    soup_.corners.push_back(corner);
+    if (has_normals_) soup_.corner_normals.push_back(corner);
+  }
+
+  // A strip's triangle k is (k, k+1, k+2), every second one turned round.
+  void end_strip(std::vector<uint32_t>& strip) {
+    if (strip.size() > 2) builder_.budget().charge(file_, strip.size() - 2, 2 * 7 * sizeof(uint32_t));
+    for (size_t k = 0; k + 2 < strip.size(); ++k) {
+      add_corner(strip[k]);
+      add_corner(strip[k + 1 + k % 2]);
+      add_corner(strip[k + 2 - k % 2]);
+      soup_.end_face();
+    }
+    strip.clear();
+  }
+
+  const std::string& file_;
+  Body& body_;
+  MeshBuilder& builder_;
+  PolygonSoup soup_;
+  bool has_normals_ = false;
+  bool colored_ = false;
+};
+
+}  // namespace
+
+void read_ply(const std::filesystem::path& path, MeshBuilder& builder) {
+  const std::string file = path.string();
+  const std::string bytes = read_file(path, builder.budget());
+  std::string_view text = bytes;
+  const Header header = read_header(file, text);
+  Body body(file, text, header.encoding);
+  PlyReader(file, body, builder).read(header);
+}
+
+}  // namespace lsp

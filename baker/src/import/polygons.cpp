@@ -1,0 +1,153 @@
+#include "import/polygons.h"
+
+#include <cmath>
+
+namespace lsp {
+namespace {
+
+// Point tests allowed for one file's concave polygons: a second or so.
+constexpr uint64_t kEarWork = 200'000'000;
+
+double area2(const glm::dvec2& a, const glm::dvec2& b, const glm::dvec2& c) {
+  return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+}
+
+void fan(std::span<const uint32_t> ring, std::vector<glm::uvec3>& out) {
+  for (size_t i = 2; i < ring.size(); ++i) out.push_back({ring[0], ring[i - 1], ring[i]});
+}
+
+// The polygon seen along its normal (Newell's, the sum of the fan's cross products), counter-clockwise. False
+// where it has no area.
+bool project(std::span<const glm::vec3> corners, std::vector<glm::dvec2>& flat) {
+  const glm::dvec3 origin(corners[0]);
+  glm::dvec3 normal(0);
+  for (size_t i = 2; i < corners.size(); ++i) {
+    normal += glm::cross(glm::dvec3(corners[i - 1]) - origin, glm::dvec3(corners[i]) - origin);
+  }
+  const glm::dvec3 size = glm::abs(normal);
+  const int axis = size.x > size.y ? (size.x > size.z ? 0 : 2) : (size.y > size.z ? 1 : 2);
+  if (!(size[axis] > 0) || !std::isfinite(size[axis])) return false;
+  const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+  flat.clear();
+  for (const glm::vec3& corner : corners) {
+    const glm::dvec3 p = glm::dvec3(corner) - origin;
+    flat.push_back(normal[axis] > 0 ? glm::dvec2(p[u], p[v]) : glm::dvec2(p[v], p[u]));
+  }
+  return true;
+}
+
+// Whether every turn is to the left or straight: then the fan is at least as good as any other cut.
+bool is_convex(std::span<const glm::dvec2> flat) {
+  const size_t n = flat.size();
+  for (size_t i = 0; i < n; ++i) {
+    if (area2(flat[i], flat[(i + 1) % n], flat[(i + 2) % n]) < 0) return false;
+  }
+  return true;
+}
+
+bool is_ear(std::span<const glm::dvec2> flat, std::span<const uint32_t> ring, size_t i) {
+  const size_t n = ring.size();
+  const glm::dvec2 a = flat[ring[(i + n - 1) % n]], b = flat[ring[i]], c = flat[ring[(i + 1) % n]];
+  if (!(area2(a, b, c) > 0)) return false;
+  for (size_t k = 0; k < n; ++k) {
+    if (k == i || k == (i + 1) % n || k == (i + n - 1) % n) continue;
+    const glm::dvec2 p = flat[ring[k]];
+    // Corners that repeat a position (the bridge to a hole) touch the ear without cutting it.
+    if (p == a || p == b || p == c) continue;
+    if (area2(a, b, p) >= 0 && area2(b, c, p) >= 0 && area2(c, a, p) >= 0) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+bool PolygonSoup::end_face() {
+  const size_t begin = face_ends.empty() ? 0 : face_ends.back();
+  if (corners.size() - begin < 3) {
+    ++too_small;
+    corners.resize(begin);
+    if (!corner_normals.empty()) corner_normals.resize(begin);
+    return false;
+  }
+  face_ends.push_back(uint32_t(corners.size()));
+  return true;
+}
+
+uint64_t PolygonSoup::triangle_count() const { return corners.size() - 2 * face_ends.size(); }
+
+void triangulate(std::span<const glm::vec3> corners, std::vector<glm::uvec3>& out, uint64_t& work) {
+  static thread_local std::vector<uint32_t> ring;
+  static thread_local std::vector<glm::dvec2> flat;
+  ring.resize(corners.size());
+  for (size_t i = 0; i < ring.size(); ++i) ring[i] = uint32_t(i);
+  if (corners.size() < 4 || work == 0 || !project(corners, flat) || is_convex(flat)) return fan(ring, out);
+
+  size_t start = 0;
+  while (ring.size() > 3) {
+    const size_t n = ring.size();
+    size_t tried = 0;
+    for (; tried < n; ++tried) {
+      const size_t i = (start + tried) % n;
+      work = work > n ? work - n : 0;
+      if (work == 0) return fan(ring, out);
+      if (!is_ear(flat, ring, i)) continue;
+      out.push_back({ring[(i + n - 1) % n], ring[i], ring[(i + 1) % n]});
+      ring.erase(ring.begin() + std::ptrdiff_t(i));
+      start = i % ring.size();
+      break;
+    }
+    if (tried == n) break;  // no ear: it crosses itself, or what is left is a line
+  }
+  fan(ring, out);
+}
+
+void add_polygons(const std::string& file, const PolygonSoup& soup, MeshBuilder& builder) {
+  builder.begin(file, soup.positions, soup.triangle_count(), MissingNormals::kSmooth);
+  std::vector<glm::vec3> polygon;
+  std::vector<glm::uvec3> cut;
+  uint64_t work = kEarWork;
+  const auto add = [&](size_t begin, const glm::uvec3& local, uint32_t material) {
+    glm::uvec3 triangle;
+    glm::vec3 normals[3];
+    for (int i = 0; i < 3; ++i) {
+      triangle[i] = soup.corners[begin + local[i]];
+      const uint32_t normal = soup.corner_normals.empty() ? kNoIndex : soup.corner_normals[begin + local[i]];
+      normals[i] = normal < soup.normals.size() ? soup.normals[normal]
+                                                : glm::vec3(std::numeric_limits<float>::quiet_NaN());
+    }
+    builder.add(triangle, normals, material);
+  };
+  size_t begin = 0;
+  for (size_t face = 0; face < soup.face_ends.size(); ++face) {
+    const size_t end = soup.face_ends[face];
+    const uint32_t material = face < soup.materials.size() ? soup.materials[face] : soup.material;
+    if (end - begin == 3) {
+      add(begin, {0, 1, 2}, material);
+    } else {
+      polygon.clear();
+      bool usable = true;
+      for (size_t k = begin; k < end && usable; ++k) {
+        usable = soup.corners[k] < soup.positions.size();
+        if (usable) polygon.push_back(soup.positions[soup.corners[k]]);
+      }
+      cut.clear();
+      if (usable) {
+        triangulate(polygon, cut, work);
+      } else {  // the builder rejects the fan's triangles that touch the missing corner, and keeps the others
+        for (uint32_t i = 2; i < end - begin; ++i) cut.push_back({0, i - 1, i});
+      }
+      for (const glm::uvec3& local : cut) add(begin, local, material);
+    }
+    begin = end;
+  }
+  builder.end();
+  if (soup.too_small) {
+    builder.note(file + ": " + std::to_string(soup.too_small) +
+                 " faces with fewer than three corners hold no triangle");
+  }
+  if (work == 0) {
+    builder.note(file + ": concave polygons are too many or too large to cut well, the last are cut as fans");
+  }
+}
+
+}  // namespace lsp
