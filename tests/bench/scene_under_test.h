@@ -1,0 +1,85 @@
+// A scene that the benchmark measures: its input, its bakes, its truth and its rays.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "embree_scene.h"
+#include "open_file.h"
+#include "rays.h"
+#include "report.h"
+
+namespace lsp::bench {
+
+// How a file is baked: lsp-bake's options, and a short name for tables and file names.
+struct Bake {
+  std::string name;                  // "N4-D9"
+  std::vector<std::string> options;  // {"--resolution", "4", "--depth", "9"}
+};
+
+Bake line_space_bake(unsigned resolution, unsigned depth);
+
+// What a bake cost. `available` is false where lsp-bake says that it does not support the options (exit 5).
+struct Baked {
+  bool available = true;
+  std::string reason;  // why it is not available
+  std::filesystem::path path;
+  double seconds = 0;
+  uint64_t peak_bytes = 0;
+  uint64_t file_bytes = 0;
+  Json report;  // lsp-bake's own JSON; empty for a scene that was given as .lsp
+};
+
+// Rays of one kind with their truth by Embree in robust mode.
+struct RaySet {
+  std::string name;
+  std::string description;
+  bool any = false;  // occlusion: hit or miss is all that is asked
+  std::vector<LspRay> rays;
+  std::vector<LspHit> truth;
+};
+
+class SceneUnderTest {
+ public:
+  // `input` is a mesh file, or an .lsp file, which is then measured as it is. Bakes go to `cache`. Bakes the
+  // paper's N = 6, D = 9 to know the triangles. Throws Failure.
+  SceneUnderTest(const std::filesystem::path& input, const std::filesystem::path& cache);
+
+  const std::string& name() const { return name_; }
+  bool is_file() const { return is_file_; }  // given as .lsp: there is one bake only
+  const Soup& soup() const { return soup_; }
+  const EmbreeScene& reference() const { return *reference_; }
+  const Camera& camera() const { return camera_; }
+
+  // Bakes once and remembers; of a scene given as .lsp only base() exists, others are not available. Throws
+  // Failure where lsp-bake fails for any reason but an option it does not support.
+  const Baked& bake(const Bake& how);
+  const Baked& base();  // N = 6, D = 9, or the file given
+
+  // The accuracy rays: area-weighted, cosine, shuffled. Made once per count.
+  const RaySet& surface(size_t count);
+
+  // What a renderer traces, about `count` rays: diffuse rays from what the camera sees; occlusion rays of
+  // limited length; shadow rays. In the order of pixels, or shuffled.
+  RaySet diffuse(size_t count, bool shuffled) const;
+  RaySet occlusion(size_t count, bool shuffled) const;
+  RaySet shadows(size_t count, bool shuffled) const;
+
+ private:
+  std::vector<SurfacePoint> seen(size_t count, Random& random) const;
+  void finish(RaySet& set, bool shuffled, Random& random) const;
+
+  std::string name_;
+  std::filesystem::path input_, cache_;
+  bool is_file_ = false;
+  std::map<std::string, Baked> bakes_;
+  Soup soup_;
+  std::unique_ptr<EmbreeScene> reference_;
+  Camera camera_;
+  std::map<size_t, RaySet> surface_;
+};
+
+}  // namespace lsp::bench

@@ -1,0 +1,119 @@
+// The report's building blocks: numbers survive, pages stand alone, timing says what it knows.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <fstream>
+#include <stdexcept>
+
+#include "report.h"
+#include "timing.h"
+
+namespace lsp::bench {
+namespace {
+
+Report sample() {
+  Report report;
+  report.title = "A <b>test</b> & more";
+  report.facts["processor"] = "abacus";
+  report.answers = {"It is 2 < 3."};
+  report.warnings = {"Two were measured together."};
+  Section section{"one", "Section one", {"Words."}, {}, {}, {}};
+  section.tables.push_back({"numbers", "Numbers", "", {{"name", "name"}, {"value", "value", 3}}, {}});
+  section.tables[0].rows.push_back({{"name", "a, \"b\""}, {"value", 1234567}});
+  section.tables[0].rows.push_back({{"name", "tiny"}, {"value", 1.25e-7}});
+  section.tables[0].rows.push_back({{"name", "none"}});
+  section.plots.push_back(
+      {"plot",
+       "Plot",
+       "",
+       {"x", true},
+       {"y", false},
+       {{"first", {{0.1, 1, "p"}, {10, 2, ""}}, true}, {"second", {{0, NAN, ""}}, false}}});
+  section.pictures.push_back({"dot", "A dot", std::string("\x89PNG\r\n", 6)});
+  report.sections.push_back(section);
+  return report;
+}
+
+TEST(Report, Base64) {
+  EXPECT_EQ(base64(""), "");
+  EXPECT_EQ(base64("M"), "TQ==");
+  EXPECT_EQ(base64("Ma"), "TWE=");
+  EXPECT_EQ(base64("Man"), "TWFu");
+  EXPECT_EQ(base64(std::string("\xff\xfe\xfd\x00", 4)), "//79AA==");
+}
+
+TEST(Report, CsvQuotesAndKeepsPrecision) {
+  EXPECT_EQ(to_csv(sample().sections[0].tables[0]),
+            "name,value\n\"a, \"\"b\"\"\",1234567\ntiny,1.25e-07\nnone,\n");
+}
+
+TEST(Report, JsonHoldsTheRows) {
+  const Json json = to_json(sample());
+  EXPECT_EQ(json["sections"]["one"]["tables"]["numbers"][1]["value"].get<double>(), 1.25e-7);
+  EXPECT_EQ(json["facts"]["processor"], "abacus");
+}
+
+TEST(Report, PageStandsAlone) {
+  const std::string html = to_html(sample());
+  EXPECT_NE(html.find("A &lt;b&gt;test&lt;/b&gt; &amp; more"), std::string::npos);
+  EXPECT_NE(html.find("1,234,567"), std::string::npos);
+  EXPECT_NE(html.find("1.2e-07"), std::string::npos);
+  EXPECT_NE(html.find("data:image/png;base64,iVBORw0K"), std::string::npos);
+  EXPECT_NE(html.find("width=device-width"), std::string::npos);
+  EXPECT_EQ(html.find("nan"), std::string::npos);
+  // Nothing is fetched: the only addresses are namespaces.
+  for (const char* word : {"src='http", "href='http", "<script", "<link", "@import", "url("}) {
+    EXPECT_EQ(html.find(word), std::string::npos) << word;
+  }
+}
+
+TEST(Report, IsWrittenWhole) {
+  const auto directory = std::filesystem::temp_directory_path() / "lsp_test_report";
+  std::filesystem::remove_all(directory);
+  write_report(sample(), directory);
+  for (const char* name : {"report.html", "report.json", "numbers.csv", "plot.svg", "dot.png"}) {
+    EXPECT_TRUE(std::filesystem::exists(directory / name)) << name;
+  }
+  std::filesystem::remove_all(directory);
+}
+
+TEST(Timing, MedianAndSpread) {
+  const Timing timing = timing_of({5, 1, 2, 3, 4});
+  EXPECT_DOUBLE_EQ(timing.median, 3);
+  EXPECT_DOUBLE_EQ(timing.least, 1);
+  EXPECT_DOUBLE_EQ(timing.spread, 2.0 / 3);
+  EXPECT_TRUE(ratio_is_meaningless(timing_of({1, 2, 3}), timing_of({2, 2.5, 3})));
+  EXPECT_FALSE(ratio_is_meaningless(timing_of({1, 1.01, 1.02}), timing_of({2, 2.01, 2.02})));
+}
+
+TEST(Timing, RaceInterleavesAndDropsTheWarmUp) {
+  std::string order;
+  int calls = 0;
+  const auto contender = [&](char name) {
+    return Contender{std::string(1, name), [&, name] {
+                       order += name;
+                       return static_cast<double>(++calls);
+                     }};
+  };
+  const auto timings = race({contender('a'), contender('b')}, 1, 2);
+  EXPECT_EQ(order, "baabba");
+  EXPECT_EQ(timings[0].repeats, 2u);
+  EXPECT_DOUBLE_EQ(timings[0].median, (3 + 6) / 2.0);
+}
+
+TEST(Timing, ChunksCoverEverythingOnce) {
+  for (unsigned threads : {1u, 3u}) {
+    std::vector<std::atomic<int>> touched(10001);
+    const double seconds = run_in_chunks(touched.size(), threads, [&](size_t first, size_t count) {
+      for (size_t i = first; i < first + count; ++i) ++touched[i];
+    });
+    EXPECT_GT(seconds, 0);
+    for (const auto& count : touched) ASSERT_EQ(count, 1);
+    EXPECT_THROW(run_in_chunks(10, threads, [](size_t, size_t) { throw std::runtime_error("no"); }),
+                 std::runtime_error);
+  }
+}
+
+}  // namespace
+}  // namespace lsp::bench
