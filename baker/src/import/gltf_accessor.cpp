@@ -175,8 +175,8 @@ std::vector<float> GltfAccessors::floats(int index, int components) {
     const uint8_t* from = checked(document_, bytes, accessor.byteOffset, accessor.count, element, stride);
     for (size_t i = 0; i < accessor.count; ++i) {
       for (int k = 0; k < components; ++k) {
-        values[i * size_t(components) + size_t(k)] =
-            load_float(from + i * stride + size_t(k) * component, accessor.componentType, accessor.normalized);
+        values[i * size_t(components) + size_t(k)] = load_float(from + i * stride + size_t(k) * component,
+                                                                accessor.componentType, accessor.normalized);
       }
     }
   }

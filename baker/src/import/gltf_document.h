@@ -21,7 +21,7 @@ using Bytes = std::span<const uint8_t>;
 struct GltfDocument {
   std::string file;
   tinygltf::Model model;       // without images, textures, animations, skins, cameras, extras; no buffer data
-  std::vector<Bytes> buffers;  // by glTF index; empty for a fallback buffer nobody filled
+  std::vector<Bytes> buffers;  // by glTF index; empty where the file gives no bytes for it
   std::vector<std::string> storage;  // what `buffers` points into
 };
 

@@ -38,18 +38,25 @@ Mesh import_meshes(std::span<const std::filesystem::path> inputs, const ImportOp
   Budget budget(options.memory_limit);
   MeshBuilder builder(budget, options.crease_angle_degrees);
   for (const std::filesystem::path& path : inputs) {
-    const uint64_t before = builder.mesh().primitive_count, rejected_before = builder.mesh().rejected.total();
+    const uint64_t count_before = builder.mesh().primitive_count;
+    const Rejected before = builder.mesh().rejected;
     try {
       read_mesh_file(path, builder);
     } catch (const std::bad_alloc&) {
       throw Failure(Exit::kLimit, path.string(), "needs more memory to import than there is, split the mesh");
     }
-    const uint64_t count = builder.mesh().primitive_count - before;
+    const uint64_t count = builder.mesh().primitive_count - count_before;
     if (count == 0) {
       throw Failure(Exit::kInvalid, path.string(), "holds no triangle, give a file with a mesh in it");
     }
-    if (count == builder.mesh().rejected.total() - rejected_before) {
-      builder.note(path.string() + ": none of its triangles can be used");
+    const Rejected& rejected = builder.mesh().rejected;
+    if (count == rejected.total() - before.total()) {
+      const std::string why = "none of its " + std::to_string(count) + " triangles can be used (" +
+                              std::to_string(rejected.degenerate - before.degenerate) + " degenerate, " +
+                              std::to_string(rejected.non_finite - before.non_finite) + " not finite, " +
+                              std::to_string(rejected.out_of_range - before.out_of_range) +
+                              " with indices out of range)";
+      throw Failure(Exit::kInvalid, path.string(), why + ", repair or leave out the file");
     }
   }
   return builder.take();

@@ -31,7 +31,8 @@ struct ImportOptions {
 // Positions are welded exactly (-0 equals +0); positions no kept triangle uses are left out.
 //
 // The files may be hostile: every count, offset and index is checked before use, and memory is bounded.
-// Throws Failure: kFile (cannot be read), kInvalid (damaged, or no triangle at all in it), kUnsupported (a
+// Throws Failure: kFile (cannot be read), kInvalid (damaged, or a file without any triangle, or
+// without any that can be used), kUnsupported (a
 // format, version or required extension, by name), kLimit (memory, or more than 2^32 - 2 triangles).
 Mesh import_meshes(std::span<const std::filesystem::path> inputs, const ImportOptions& options);
 

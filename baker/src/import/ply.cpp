@@ -116,15 +116,13 @@ Header read_header(const std::string& file, std::string_view& text) {
       }
       property.name = word;
       header.elements.back().properties.push_back(std::move(property));
-    } else {
-      fail(file, "has the unknown word " + printable(word.substr(0, 40)) + " in its header");
-    }
+    }  // anything else is passed over: exporters have written comments without that word
   }
   fail(file, "has a header without an end");
 }
 
-// Values of the body one after the other. Numbers of an ASCII body are separated by any white space; line
-// ends mean nothing, so that lists may be broken over lines.
+// Values of the body one after the other. An element of an ASCII body may be broken over lines; what its last
+// line holds beyond the declared properties is passed over, as files with undeclared values exist.
 class Body {
  public:
   Body(const std::string& file, std::string_view bytes, Encoding encoding)
@@ -163,6 +161,13 @@ class Body {
       return whole(number_of(text));
     }
     return whole(number(type));
+  }
+
+  void end_element() {
+    if (encoding_ != Encoding::kAscii) return;
+    size_t end = 0;
+    while (end < bytes_.size() && !is_line_end(bytes_[end])) ++end;
+    bytes_.remove_prefix(end);
   }
 
   void skip(const Property& property) {
@@ -276,6 +281,7 @@ class PlyReader {
     if (element.properties.empty()) return;
     for (uint64_t i = 0; i < element.count; ++i) {
       for (const Property& property : element.properties) body_.skip(property);
+      body_.end_element();
     }
   }
 
@@ -309,6 +315,7 @@ class PlyReader {
           vectors[targets[k] / 3][targets[k] % 3] = float(body_.number(element.properties[k].type));
         }
       }
+      body_.end_element();
       soup_.positions.push_back(vectors[0]);
       if (has_normals_) soup_.normals.push_back(vectors[1]);
     }
@@ -352,6 +359,7 @@ class PlyReader {
           soup_.end_face();
         }
       }
+      body_.end_element();
     }
   }
 
