@@ -26,6 +26,7 @@ constexpr KnownType kKnown[kKnownSectionCount] = {
 
 constexpr uint64_t kPackedAlignment = 256;
 constexpr uint32_t kMaxAlignment = 65536;
+constexpr uint64_t kStepsSlack = 16;
 constexpr uint32_t kMaxReferences = 1u << 30;  // a traversal marks references in their two highest bits
 
 int known_index(uint32_t type) {
@@ -77,6 +78,13 @@ lsp_status check_limits(const LspHeader& header, lsp_error* error) {
   if (header.max_stack > LSP_MAX_STACK) {
     return fail(error, LSP_ERROR_LIMIT, offsetof(LspHeader, max_stack),
                 "needs a stack of %u entries, the limit is %u", header.max_stack, LSP_MAX_STACK);
+  }
+  // Every node and leaf is visited once at most, so a loop bounded by this ends soon even where nodes form a
+  // ring.
+  if (header.max_steps > 2 * uint64_t{header.node_count} + kStepsSlack) {
+    return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, max_steps),
+                "states %u steps of traversal, more than its %u nodes have children", header.max_steps,
+                header.node_count);
   }
   if (header.max_leaf_triangles > LSP_MAX_LEAF_TRIANGLES) {
     return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, max_leaf_triangles),

@@ -256,7 +256,12 @@ LSP_FN LspPassage lsp_pass(LSP_IN(LspSetup) s, LSP_IN(LspLineSpace) ls) {
   uint n = ls.format & LSP_FORMAT_RESOLUTION_MASK;
   uint patch_in = lsp_patch(point_in, lo, scale, axis_in, n);
   uint patch_out = lsp_patch(point_out, lo, scale, axis_out, n);
-  p.shaft = LSP_SHAFT_INDEX(face_in, face_out, patch_in, patch_out, n);
+  if ((ls.format & LSP_FORMAT_SYMMETRIC) == 0u)
+    p.shaft = LSP_SHAFT_INDEX(face_in, face_out, patch_in, patch_out, n);
+  else if (face_in < face_out)
+    p.shaft = LSP_SHAFT_INDEX_SYMMETRIC(face_in, face_out, patch_in, patch_out, n);
+  else
+    p.shaft = LSP_SHAFT_INDEX_SYMMETRIC(face_out, face_in, patch_out, patch_in, n);
   return p;
 }
 
@@ -273,7 +278,9 @@ LSP_FN uint lsp_candidate(LSP_SCENE_ LSP_IN(LspLineSpace) ls, uint shaft) {
   }
   uint bytes = (ls.format >> LSP_FORMAT_ENTRY_SHIFT) & LSP_FORMAT_ENTRY_MASK;
   uint local;
-  if (bytes == 1u) {
+  if (bytes == 0u) {
+    local = 0u; /* binary: any triangle stands for all */
+  } else if (bytes == 1u) {
     local = (LSP_CANDIDATE(ls.candidate_first + (entry >> 2u)) >> ((entry & 3u) * 8u)) & 0xFFu;
     local = local == 0xFFu && (ls.format & LSP_FORMAT_DENSE) != 0u ? LSP_NONE : local;
   } else if (bytes == 2u) {
@@ -293,6 +300,17 @@ LSP_FN void lsp_look_up(LSP_SCENE_ LSP_IN(LspSetup) s, uint index, LSP_INOUT(Lsp
   if (pass.t_in > pass.t_out || pass.t_in >= best.t) return;
   uint candidate = lsp_candidate(LSP_SCENE_ARG_ ls, pass.shaft);
   if (candidate == LSP_NONE) return;
+  if (((ls.format >> LSP_FORMAT_ENTRY_SHIFT) & LSP_FORMAT_ENTRY_MASK) == 0u) {
+    /* A binary Line Space knows that something is hit, not where: the middle of the passage. */
+    LSP_PRECISE float middle = 0.5f * (lsp_max(pass.t_in, s.tmin) + pass.t_out);
+    if (!(middle > s.tmin && middle < best.t)) return;
+    best.t = middle;
+    best.u = 0.0f;
+    best.v = 0.0f;
+    best.triangle = candidate;
+    best.flags = LSP_HIT_LINE_SPACE | (pass.t_in <= s.tmin ? LSP_HIT_ORIGIN_INSIDE : 0u);
+    return;
+  }
   LspTriangle tri = LSP_TRIANGLE(candidate);
   vec3 v0 = LSP_LOAD3(tri.v0);
   vec3 e1 = LSP_LOAD3(tri.v1) - v0;
