@@ -1,0 +1,56 @@
+// lsp-compare: how far apart two linear pictures are, in numbers and as a picture.
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "../command_line.h"
+#include "compare.h"
+
+int main(int argc, char** argv) {
+  using namespace lsp;
+  using namespace lsp::sample;
+  constexpr const char* kProgram = "lsp-compare";
+  CLI::App app("Compares two linear pictures (.pfm) of the same size: REFERENCE with TEST.", kProgram);
+  CommonOptions common;
+  std::string reference_path;
+  std::string test_path;
+  std::string output;
+  float factor = 4.0f;
+  double max_rmse = -1.0;
+  add_common_options(app, kProgram, common);
+  app.add_option("REFERENCE.pfm", reference_path, "The picture to trust")->required();
+  app.add_option("TEST.pfm", test_path, "The picture to judge")->required();
+  app.add_option("-o,--output", output, "Write the absolute difference, amplified, to this .png or .pfm");
+  app.add_option("--factor", factor, "Amplification of the difference picture (default 4)")
+      ->check(CLI::Range(0.0f, 1e6f));
+  app.add_option("--max-rmse", max_rmse, "Exit with 7 if the linear RMSE is larger");
+  return run_program(kProgram, app, argc, argv, [&] {
+    const Picture reference = read_pfm(reference_path);
+    const Picture test = read_pfm(test_path);
+    const Comparison c = compare(reference, test);
+    if (!output.empty()) write_picture(output, difference(reference, test, factor), Transfer::kDisplay);
+    const double far_share =
+        static_cast<double>(c.pixels_over_5_percent) / static_cast<double>(test.pixels.size());
+    if (common.json) {
+      nlohmann::ordered_json json = {{"mean_absolute", c.mean_absolute},
+                                     {"rmse", c.rmse},
+                                     {"relative_mean", c.relative_mean},
+                                     {"mean_reference", c.mean_reference},
+                                     {"mean_test", c.mean_test},
+                                     {"pixels_over_5_percent", far_share},
+                                     {"factor", factor}};
+      // JSON has no infinity; equal pictures have no PSNR.
+      json["psnr_db"] =
+          std::isfinite(c.psnr_db) ? nlohmann::ordered_json(c.psnr_db) : nlohmann::ordered_json();
+      std::cout << json.dump(2) << "\n";
+    } else if (!common.quiet) {
+      std::cout << "RMSE " << c.rmse << ", mean absolute " << c.mean_absolute << " (" << 100 * c.relative_mean
+                << " % of the mean), PSNR " << c.psnr_db << " dB, " << 100 * far_share
+                << " % of pixels differ visibly (over 5 % in a displayed channel)\n";
+    }
+    if (max_rmse >= 0 && !(c.rmse <= max_rmse)) {
+      throw Failure(Exit::kDiffer, test_path,
+                    "RMSE " + std::to_string(c.rmse) + " against " + reference_path + " is over " +
+                        std::to_string(max_rmse));
+    }
+  });
+}

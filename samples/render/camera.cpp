@@ -1,0 +1,113 @@
+#include "camera.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <vector>
+
+#include "lsp/program.h"
+
+namespace lsp::sample {
+namespace {
+
+constexpr float kPi = 3.14159265358979324f;
+
+// Free distances from `origin` along `directions`, exact; misses are infinite.
+std::vector<float> free_distances(RayTracer& tracer, glm::vec3 origin,
+                                  const std::vector<glm::vec3>& directions) {
+  std::vector<LspRay> rays;
+  for (const glm::vec3& d : directions) {
+    rays.push_back({from_glm(origin), 0.0f, from_glm(d), std::numeric_limits<float>::infinity()});
+  }
+  std::vector<LspHit> hits(rays.size());
+  tracer.trace({0, 0.0f}, rays, hits);
+  std::vector<float> distances;
+  for (const LspHit& hit : hits) distances.push_back(hit.t);
+  return distances;
+}
+
+}  // namespace
+
+LspRay Camera::ray(glm::vec2 pixel, int width, int height) const {
+  const glm::vec3 forward = glm::normalize(target - eye);
+  const glm::vec3 world_up = std::abs(forward.y) > 0.999f ? glm::vec3(0, 0, 1) : glm::vec3(0, 1, 0);
+  const glm::vec3 right = glm::normalize(glm::cross(forward, world_up));
+  const glm::vec3 up = glm::cross(right, forward);
+  const float half = std::tan(fov_degrees * kPi / 360.0f);
+  const float x = (2.0f * pixel.x - static_cast<float>(width)) / static_cast<float>(height) * half;
+  const float y = (1.0f - 2.0f * pixel.y / static_cast<float>(height)) * half;
+  const glm::vec3 direction = glm::normalize(forward + x * right + y * up);
+  return {from_glm(eye), 0.0f, from_glm(direction), std::numeric_limits<float>::infinity()};
+}
+
+Camera parse_camera(const std::string& text) {
+  Camera camera;
+  int used = 0;
+  const int count =
+      std::sscanf(text.c_str(), "%f,%f,%f:%f,%f,%f:%f%n", &camera.eye.x, &camera.eye.y, &camera.eye.z,
+                  &camera.target.x, &camera.target.y, &camera.target.z, &camera.fov_degrees, &used);
+  const float distance = glm::length(camera.target - camera.eye);
+  if (count != 7 || static_cast<size_t>(used) != text.size() || !std::isfinite(distance) || distance <= 0 ||
+      !(camera.fov_degrees > 0 && camera.fov_degrees < 179)) {
+    throw Failure(Exit::kUsage, "",
+                  "--camera '" + text + "' is not EYE_X,EYE_Y,EYE_Z:TARGET_X,TARGET_Y,TARGET_Z:DEGREES");
+  }
+  return camera;
+}
+
+std::string to_string(const Camera& c) {
+  char text[256];
+  std::snprintf(text, sizeof text, "%g,%g,%g:%g,%g,%g:%g", static_cast<double>(c.eye.x),
+                static_cast<double>(c.eye.y), static_cast<double>(c.eye.z), static_cast<double>(c.target.x),
+                static_cast<double>(c.target.y), static_cast<double>(c.target.z),
+                static_cast<double>(c.fov_degrees));
+  return text;
+}
+
+Camera default_camera(const RenderScene& scene, RayTracer& tracer) {
+  const glm::vec3 size = scene.hi() - scene.lo();
+  const glm::vec3 centre = 0.5f * (scene.lo() + scene.hi());
+  const float diagonal = scene.diagonal();
+  const glm::vec3 inside(centre.x, scene.lo().y + 0.4f * size.y, centre.z);
+
+  std::vector<glm::vec3> around;
+  for (int i = 0; i < 64; ++i) {
+    const float angle = 2.0f * kPi * static_cast<float>(i) / 64.0f;
+    around.emplace_back(std::cos(angle), 0.0f, std::sin(angle));
+  }
+  const std::vector<float> free = free_distances(tracer, inside, around);
+  size_t walls = 0;
+  size_t wide = 0;
+  for (const float distance : free) {
+    if (std::isfinite(distance)) ++walls;
+    if (distance > 0.12f * diagonal) ++wide;
+  }
+  // A hall has walls nearly all around, most of them some way off. A solid body has its own skin near.
+  if (walls > 56 && wide > 24) {
+    size_t best = 0;
+    float best_length = -1.0f;
+    for (size_t i = 0; i < free.size(); ++i) {
+      const float ahead = std::min(free[i], diagonal);
+      const float behind = std::min(free[(i + 32) % 64], diagonal);
+      if (ahead + behind > best_length) {
+        best_length = ahead + behind;
+        best = i;
+      }
+    }
+    const size_t back = free[best] > free[(best + 32) % 64] ? (best + 32) % 64 : best;
+    Camera camera;
+    camera.eye = inside + around[back] * 0.8f * std::min(free[back], diagonal);
+    camera.target = inside - around[back] * 0.1f * diagonal;
+    camera.fov_degrees = 65.0f;
+    return camera;
+  }
+  Camera camera;
+  camera.fov_degrees = 38.0f;
+  camera.target = centre;
+  camera.eye = centre + glm::normalize(glm::vec3(0.6f, 0.42f, 1.0f)) *
+                            (0.58f * diagonal / std::sin(19.0f * kPi / 180.0f));
+  return camera;
+}
+
+}  // namespace lsp::sample

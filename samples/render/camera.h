@@ -1,0 +1,29 @@
+// A pinhole camera, and one that suits a scene nobody has seen yet.
+#pragma once
+
+#include <glm/glm.hpp>
+#include <string>
+
+#include "ray_tracer.h"
+
+namespace lsp::sample {
+
+struct Camera {
+  glm::vec3 eye{0.0f};
+  glm::vec3 target{0.0f, 0.0f, -1.0f};
+  float fov_degrees = 55.0f;  // vertical
+
+  // The ray through a point of the picture: x in [0, width], y in [0, height] from the top. Its direction has
+  // unit length.
+  LspRay ray(glm::vec2 pixel, int width, int height) const;
+};
+
+// Parses "X,Y,Z:X,Y,Z:FOV" (eye, target, vertical angle in degrees). Throws lsp::Failure (kUsage).
+Camera parse_camera(const std::string& text);
+std::string to_string(const Camera& camera);
+
+// Inside a hall it stands where it sees far, at two fifths of the height; otherwise it looks at the whole
+// from the front, right and above. y is up.
+Camera default_camera(const RenderScene& scene, RayTracer& tracer);
+
+}  // namespace lsp::sample

@@ -1,0 +1,185 @@
+// lsp-render: a picture of an .lsp file, its indirect light traced exactly or approximately.
+#include <unistd.h>
+
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "../command_line.h"
+#include "lsp/lsp_vulkan.h"
+#include "renderer.h"
+
+namespace lsp::sample {
+namespace {
+
+struct Arguments {
+  std::string file;
+  std::string output;
+  std::string effect = "all";
+  std::string mode = "exact";
+  std::string near_field = "exact";
+  std::string camera;
+  std::string size = "960x540";
+  std::string backend = "cpu";
+  std::string sun;
+  float exposure = 0.0f;
+  RenderOptions options;
+};
+
+void parse_size(const std::string& text, RenderOptions& options) {
+  int used = 0;
+  const int count = std::sscanf(text.c_str(), "%dx%d%n", &options.width, &options.height, &used);
+  constexpr int kLargest = 16384;
+  if (count != 2 || static_cast<size_t>(used) != text.size() || options.width < 1 || options.height < 1 ||
+      options.width > kLargest || options.height > kLargest) {
+    throw Failure(Exit::kUsage, "", "--size '" + text + "' is not WIDTHxHEIGHT, each from 1 to 16384");
+  }
+}
+
+Sky parse_sun(const std::string& text) {
+  Sky sky;
+  if (text.empty()) return sky;
+  glm::vec3 d(0.0f);
+  int used = 0;
+  const int count = std::sscanf(text.c_str(), "%f,%f,%f%n", &d.x, &d.y, &d.z, &used);
+  if (count != 3 || static_cast<size_t>(used) != text.size() || !(glm::length(d) > 0) ||
+      !std::isfinite(glm::length(d))) {
+    throw Failure(Exit::kUsage, "", "--sun '" + text + "' is not X,Y,Z, the direction towards the sun");
+  }
+  sky.sun_direction = glm::normalize(d);
+  return sky;
+}
+
+Effect parse_effect(const std::string& name) {
+  if (name == "ao") return Effect::kAmbientOcclusion;
+  if (name == "direct") return Effect::kDirect;
+  if (name == "diffuse") return Effect::kDiffuse;
+  if (name == "glossy") return Effect::kGlossy;
+  return Effect::kAll;
+}
+
+double mega(uint64_t rays, double seconds) {
+  return seconds > 0 ? static_cast<double>(rays) / seconds * 1e-6 : 0;
+}
+
+void run(const Arguments& arguments, const CommonOptions& common, const char* program) {
+  RenderOptions options = arguments.options;
+  options.effect = parse_effect(arguments.effect);
+  options.approximate = arguments.mode == "approximate";
+  options.near_approximate = arguments.near_field == "approximate";
+  parse_size(arguments.size, options);
+  const std::filesystem::path output = arguments.output;
+  if (output.extension() != ".png" && output.extension() != ".pfm") {
+    throw Failure(Exit::kUsage, arguments.output,
+                  "pictures are written as .png or .pfm; choose one of the two");
+  }
+  const Sky sky = parse_sun(arguments.sun);
+  Camera camera = arguments.camera.empty() ? Camera{} : parse_camera(arguments.camera);
+
+  const RenderScene scene(arguments.file);
+  if (options.approximate && !scene.has_line_spaces()) {
+    throw Failure(Exit::kUnsupported, arguments.file,
+                  "has no Line Spaces; bake it with them or use --mode exact");
+  }
+  if (!common.quiet) {
+    for (const std::string& note : scene.notes())
+      std::cerr << program << ": " << arguments.file << ": " << note << "\n";
+  }
+  const uint32_t uses = LSP_USE_EXACT | (options.approximate ? LSP_USE_APPROXIMATE : 0u);
+  const auto tracer = arguments.backend == "vulkan" ? make_vulkan_tracer(scene, uses)
+                                                    : make_cpu_tracer(scene, options.threads);
+  if (arguments.camera.empty()) camera = default_camera(scene, *tracer);
+
+  const bool show_progress = !common.quiet && isatty(STDERR_FILENO) != 0;
+  RenderReport report;
+  Picture picture = render(scene, sky, camera, options, *tracer, report, [&](double done) {
+    if (show_progress) std::fprintf(stderr, "\rrendering %3.0f %%", 100.0 * done);
+  });
+  if (show_progress) std::fprintf(stderr, "\r               \r");
+  const bool grey = options.effect == Effect::kAmbientOcclusion;
+  if (output.extension() == ".png" && !grey) {
+    for (glm::vec3& pixel : picture.pixels) pixel *= std::exp2(arguments.exposure);
+  }
+  write_picture(output, picture, grey ? Transfer::kDisplay : Transfer::kToneMapped);
+
+  const double rate = mega(report.indirect_rays, report.indirect_seconds);
+  if (common.json) {
+    std::cout << nlohmann::ordered_json{{"file", arguments.file},
+                                        {"output", arguments.output},
+                                        {"effect", arguments.effect},
+                                        {"mode", arguments.mode},
+                                        {"near", arguments.near_field},
+                                        {"lod", options.lod},
+                                        {"width", options.width},
+                                        {"height", options.height},
+                                        {"samples", options.samples},
+                                        {"bounces", options.bounces},
+                                        {"camera", to_string(camera)},
+                                        {"backend", arguments.backend},
+                                        {"device", tracer->device()},
+                                        {"load_path", tracer->load_path()},
+                                        {"seconds", report.seconds},
+                                        {"primary_rays", report.primary_rays},
+                                        {"primary_seconds", report.primary_seconds},
+                                        {"shadow_rays", report.shadow_rays},
+                                        {"shadow_seconds", report.shadow_seconds},
+                                        {"indirect_rays", report.indirect_rays},
+                                        {"indirect_seconds", report.indirect_seconds},
+                                        {"indirect_mrays_per_second", rate},
+                                        {"mean_luminance", report.mean_luminance}}
+                     .dump(2)
+              << "\n";
+  } else if (!common.quiet) {
+    std::printf("%s: %d x %d, %u samples, %s, %s, %s\n", arguments.output.c_str(), options.width,
+                options.height, options.samples, arguments.effect.c_str(), arguments.mode.c_str(),
+                tracer->device().c_str());
+    std::printf(
+        "%.2f s; indirect %.2f Mrays in %.2f s: %.2f Mrays/s; primary %.2f s, shadow %.2f s; camera %s\n",
+        report.seconds, static_cast<double>(report.indirect_rays) * 1e-6, report.indirect_seconds, rate,
+        report.primary_seconds, report.shadow_seconds, to_string(camera).c_str());
+  }
+}
+
+}  // namespace
+}  // namespace lsp::sample
+
+int main(int argc, char** argv) {
+  using namespace lsp;
+  using namespace lsp::sample;
+  constexpr const char* kProgram = "lsp-render";
+  CLI::App app("Renders an .lsp file. Primary rays are exact; --mode governs indirect rays.", kProgram);
+  CommonOptions common;
+  Arguments a;
+  add_common_options(app, kProgram, common);
+  app.add_option("FILE.lsp", a.file, "The baked scene")->required();
+  app.add_option("-o,--output", a.output, "The picture: .png (tone-mapped) or .pfm (linear floats)")
+      ->required();
+  app.add_option("--effect", a.effect, "ao, diffuse, glossy, all or direct (default all)")
+      ->check(CLI::IsMember({"ao", "diffuse", "glossy", "all", "direct"}));
+  app.add_option("--mode", a.mode, "exact or approximate (default exact)")
+      ->check(CLI::IsMember({"exact", "approximate"}));
+  app.add_option("--near", a.near_field,
+                 "In approximate mode, the Line Space around a ray's origin: exact (default) or approximate")
+      ->check(CLI::IsMember({"exact", "approximate"}));
+  app.add_option(
+         "--lod", a.options.lod,
+         "Stop at a Line Space once its diagonal is under LOD times the distance (default 0: deepest only)")
+      ->check(CLI::Range(0.0f, 1e6f));
+  app.add_option("--camera", a.camera,
+                 "X,Y,Z:X,Y,Z:FOV: eye, target, vertical angle in degrees (default: from the scene)");
+  app.add_option("--size", a.size, "WxH in pixels (default 960x540)");
+  app.add_option("--samples", a.options.samples, "Samples a pixel (default 16)")
+      ->check(CLI::Range(1u, 1u << 20));
+  app.add_option("--bounces", a.options.bounces, "Bounces of indirect light (default 1)")
+      ->check(CLI::Range(1, 16));
+  app.add_option("--ao-distance", a.options.ao_distance,
+                 "Reach of --effect ao in diagonals of the scene (default 0.1)")
+      ->check(CLI::Range(1e-6f, 1e6f));
+  app.add_option("--sun", a.sun, "X,Y,Z: direction towards the sun");
+  app.add_option("--exposure", a.exposure, "Stops to brighten a .png by (default 0)")
+      ->check(CLI::Range(-20.0f, 20.0f));
+  app.add_option("--backend", a.backend, "cpu or vulkan (default cpu)")
+      ->check(CLI::IsMember({"cpu", "vulkan"}));
+  app.add_option("--threads", a.options.threads, "Threads of the CPU (default: all)")
+      ->check(CLI::Range(1, 1024));
+  return run_program(kProgram, app, argc, argv, [&] { run(a, common, kProgram); });
+}

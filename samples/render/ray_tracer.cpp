@@ -1,0 +1,71 @@
+#include "ray_tracer.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <chrono>
+
+#include "lsp/program.h"
+#include "lsp/vulkan_device.hpp"
+
+namespace lsp::sample {
+namespace {
+
+class CpuTracer : public RayTracer {
+ public:
+  CpuTracer(const RenderScene& scene, int threads)
+      : scene_(scene.view()), arena_(threads > 0 ? threads : tbb::task_arena::automatic) {}
+
+  double trace(const lsp_trace_options& options, std::span<const LspRay> rays,
+               std::span<LspHit> hits) override {
+    const auto start = std::chrono::steady_clock::now();
+    arena_.execute([&] {
+      tbb::parallel_for(tbb::blocked_range<size_t>(0, rays.size(), 2048), [&](const auto& range) {
+        lsp_error error{};
+        if (lsp_trace(&scene_, &options, rays.data() + range.begin(), hits.data() + range.begin(),
+                      range.size(), nullptr, &error) != LSP_OK) {
+          throw Failure(static_cast<Exit>(error.status), "", error.message);
+        }
+      });
+    });
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  }
+
+  std::string device() const override {
+    return "CPU, " + std::to_string(arena_.max_concurrency()) + " threads";
+  }
+  std::string load_path() const override { return "mapped"; }
+
+ private:
+  const lsp_scene& scene_;
+  tbb::task_arena arena_;
+};
+
+class VulkanRayTracer : public RayTracer {
+ public:
+  VulkanRayTracer(const RenderScene& scene, uint32_t uses) { tracer_.load(scene.view(), uses); }
+
+  double trace(const lsp_trace_options& options, std::span<const LspRay> rays,
+               std::span<LspHit> hits) override {
+    if (rays.empty()) return 0;
+    return tracer_.trace(options, rays, hits).seconds;
+  }
+  std::string device() const override { return tracer_.device_name(); }
+  std::string load_path() const override { return name_of(tracer_.load_path()); }
+
+ private:
+  VulkanTracer tracer_;
+};
+
+}  // namespace
+
+std::unique_ptr<RayTracer> make_cpu_tracer(const RenderScene& scene, int threads) {
+  return std::make_unique<CpuTracer>(scene, threads);
+}
+
+std::unique_ptr<RayTracer> make_vulkan_tracer(const RenderScene& scene, uint32_t uses) {
+  return std::make_unique<VulkanRayTracer>(scene, uses);
+}
+
+}  // namespace lsp::sample

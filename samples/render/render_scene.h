@@ -1,0 +1,93 @@
+// An open .lsp file with what shading needs beside it: triangles by primitive, materials, emitters, a sky.
+#pragma once
+
+#include <filesystem>
+#include <glm/glm.hpp>
+#include <string>
+#include <vector>
+
+#include "lsp/lsp.h"
+
+namespace lsp::sample {
+
+// A point of the scene seen along a ray.
+struct SurfacePoint {
+  glm::vec3 position;
+  glm::vec3 geometric_normal;  // unit, on the side the ray came from
+  glm::vec3 shading_normal;    // unit, on the same side
+  glm::vec3 base_color;
+  glm::vec3 emission;
+  float roughness = 1.0f;
+  float metallic = 0.0f;
+};
+
+// A point on a light-emitting triangle, chosen in proportion to area times luminance.
+struct EmitterPoint {
+  glm::vec3 position;
+  glm::vec3 normal;  // unit; emitters shine to both sides
+  glm::vec3 radiance;
+  float pdf = 0.0f;  // per area
+};
+
+// Owns the mapping of the file.
+class RenderScene {
+ public:
+  // Maps and opens `path`; a packed file is unpacked into memory. Throws lsp::Failure: kFile, kInvalid, or
+  // kUnsupported for a file without an exact tree, which primary rays need.
+  explicit RenderScene(const std::filesystem::path& path);
+  ~RenderScene();
+  RenderScene(const RenderScene&) = delete;
+  RenderScene& operator=(const RenderScene&) = delete;
+
+  const lsp_scene& view() const { return scene_; }
+  glm::vec3 lo() const;
+  glm::vec3 hi() const;
+  float diagonal() const { return glm::length(hi() - lo()); }
+  bool has_line_spaces() const;
+  // What the file does not have and what stands in for it; empty if nothing is missing.
+  const std::vector<std::string>& notes() const { return notes_; }
+
+  // The point that `ray` hits; `hit` must be a hit of this scene.
+  SurfacePoint surface(const LspRay& ray, const LspHit& hit) const;
+
+  bool has_emitters() const { return !emitters_.empty(); }
+  // `chance` picks the triangle, `point` the place on it; all in [0, 1).
+  EmitterPoint sample_emitter(float chance, glm::vec2 point) const;
+
+ private:
+  struct Emitter {
+    uint32_t triangle;
+    float cumulative;  // of area times luminance, up to and with this one, over the total
+    float pdf;         // per area
+  };
+  void index_primitives(const std::string& file);
+  void find_emitters();
+
+  lsp_mapping mapping_{};
+  std::vector<LspHeader> unpacked_;  // 256-byte blocks, so that the bytes are aligned
+  lsp_scene scene_{};
+  std::vector<uint32_t> triangle_of_primitive_;
+  std::vector<LspMaterial> materials_;
+  std::vector<Emitter> emitters_;
+  std::vector<std::string> notes_;
+};
+
+// The light from outside: a clear sky with a sun in it. y is up.
+struct Sky {
+  glm::vec3 sun_direction = glm::normalize(glm::vec3(-0.28f, 0.80f, 0.53f));
+  glm::vec3 sun_irradiance = glm::vec3(1.0f, 0.86f, 0.68f) * 11.0f;
+  float sun_radius_rad = 0.012f;
+  float brightness = 1.0f;
+  // Radiance of the sky without the sun's disc.
+  glm::vec3 radiance(glm::vec3 direction) const;
+};
+
+// Unit vectors that make a right-handed frame with unit `n` (Duff et al. 2017).
+void make_frame(glm::vec3 n, glm::vec3& tangent, glm::vec3& bitangent);
+// A cosine-distributed direction about unit `n`.
+glm::vec3 cosine_direction(glm::vec3 n, glm::vec2 random);
+
+inline glm::vec3 to_glm(lsp_float3 v) { return {v.x, v.y, v.z}; }
+inline lsp_float3 from_glm(glm::vec3 v) { return {v.x, v.y, v.z}; }
+
+}  // namespace lsp::sample

@@ -1,0 +1,434 @@
+#include "renderer.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include "sampler.h"
+
+namespace lsp::sample {
+namespace {
+
+constexpr float kPi = 3.14159265358979324f;
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr size_t kWavePixels = size_t{1} << 17;
+
+// Brighter single samples are cut: they would stay as white dots. The bound is far over anything that a
+// picture shows.
+constexpr float kLargestSample = 60.0f;
+
+// Surfaces rougher than this that are no metal have no glossy ray: their lobe is diffuse to the eye.
+constexpr float kRoughestGlossy = 0.7f;
+
+// Pairs of random numbers a sample draws, by purpose. Bounce b adds b times kDimensionsPerBounce.
+enum Dimension : uint32_t {
+  kPixelPoint,
+  kGlossyDirection,
+  kOcclusionDirection,
+  kDirectFirst,  // three: see add_light_rays
+  kDiffuseDirection = kDirectFirst + 4,
+  kPathLightFirst,  // three of the diffuse path, then three of the glossy one
+  kDimensionsPerBounce = 12,
+};
+
+struct Surface {
+  uint32_t item;  // in the wave
+  SurfacePoint point;
+  glm::vec3 to_eye;
+};
+
+// A path that looks for indirect light.
+struct Path {
+  uint32_t item;
+  bool glossy;  // its first ray left along a reflection
+  glm::vec3 throughput;
+};
+
+// A ray that brings `radiance` to its item unless something is in its way.
+struct LightRay {
+  uint32_t item;
+  glm::vec3 radiance;
+};
+
+class Renderer {
+ public:
+  Renderer(const RenderScene& scene, const Sky& sky, const Camera& camera, const RenderOptions& options,
+           RayTracer& tracer, RenderReport& report)
+      : scene_(scene),
+        sky_(sky),
+        camera_(camera),
+        options_(options),
+        tracer_(tracer),
+        report_(report),
+        arena_(options.threads > 0 ? options.threads : tbb::task_arena::automatic),
+        offset_(3e-5f * scene.diagonal()),
+        picture_(options.width, options.height) {
+    indirect_flags_ = options.approximate ? LSP_TRACE_APPROXIMATE : 0u;
+    if (options.approximate && options.near_approximate) indirect_flags_ |= LSP_TRACE_NEAR_APPROXIMATE;
+    order_pixels();
+  }
+
+  Picture render(const std::function<void(double)>& progress) {
+    const auto start = std::chrono::steady_clock::now();
+    const size_t waves = (order_.size() + kWavePixels - 1) / kWavePixels;
+    const double total = static_cast<double>(waves) * options_.samples;
+    double done = 0;
+    for (size_t wave = 0; wave < waves; ++wave) {
+      first_ = wave * kWavePixels;
+      count_ = std::min(kWavePixels, order_.size() - first_);
+      sum_.assign(count_, glm::vec3(0.0f));
+      for (uint32_t sample = 0; sample < options_.samples; ++sample) {
+        sample_ = options_.first_sample + sample;
+        render_sample();
+        done += 1;
+        if (progress) progress(done / total);
+      }
+      for (size_t i = 0; i < count_; ++i) {
+        picture_.pixels[order_[first_ + i]] = sum_[i] / static_cast<float>(options_.samples);
+      }
+    }
+    double luminance = 0;
+    for (const glm::vec3& p : picture_.pixels) {
+      luminance += static_cast<double>(glm::dot(p, glm::vec3(0.2126f, 0.7152f, 0.0722f)));
+    }
+    report_.mean_luminance = luminance / static_cast<double>(picture_.pixels.size());
+    report_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return std::move(picture_);
+  }
+
+ private:
+  // Pixels in blocks of 8 x 8: neighbours in a batch see the same parts of the scene.
+  void order_pixels() {
+    for (int by = 0; by < options_.height; by += 8) {
+      for (int bx = 0; bx < options_.width; bx += 8) {
+        for (int y = by; y < std::min(by + 8, options_.height); ++y) {
+          for (int x = bx; x < std::min(bx + 8, options_.width); ++x) {
+            order_.push_back(static_cast<uint32_t>(y * options_.width + x));
+          }
+        }
+      }
+    }
+  }
+
+  template <typename Body>
+  void for_each(size_t count, const Body& body) {
+    arena_.execute([&] {
+      tbb::parallel_for(tbb::blocked_range<size_t>(0, count, 1024), [&](const auto& range) {
+        for (size_t i = range.begin(); i < range.end(); ++i) body(i);
+      });
+    });
+  }
+
+  glm::vec2 random(size_t item, uint32_t dimension) const {
+    const uint32_t seed = hash_combine(hash_mix(order_[first_ + item] + 0x68BC21EBu), dimension);
+    return sobol_point(sample_, seed);
+  }
+
+  // Each light ray's item is its own, but rays of one item follow one another: the sum is made by one thread.
+  void add(uint32_t item, glm::vec3 radiance) {
+    const float largest = std::max({radiance.x, radiance.y, radiance.z});
+    if (!(largest > 0) || !std::isfinite(largest)) return;
+    sum_[item] += largest > kLargestSample ? radiance * (kLargestSample / largest) : radiance;
+  }
+
+  LspRay ray_from(const SurfacePoint& p, glm::vec3 direction, float tmax) const {
+    return {from_glm(p.position + offset_ * p.geometric_normal), 0.0f, from_glm(direction), tmax};
+  }
+
+  // A direction that the shading normal allows but that runs into the surface is mirrored out of it.
+  static glm::vec3 above(const SurfacePoint& p, glm::vec3 direction) {
+    const float depth = glm::dot(direction, p.geometric_normal);
+    return depth < 0 ? direction - 2.0f * depth * p.geometric_normal : direction;
+  }
+
+  bool wants(Effect effect) const { return options_.effect == effect || options_.effect == Effect::kAll; }
+
+  void render_sample() {
+    rays_.resize(count_);
+    hits_.resize(count_);
+    for_each(count_, [&](size_t i) {
+      const uint32_t pixel = order_[first_ + i];
+      const auto width = static_cast<uint32_t>(options_.width);
+      const glm::vec2 corner(static_cast<float>(pixel % width), static_cast<float>(pixel / width));
+      rays_[i] = camera_.ray(corner + random(i, kPixelPoint), options_.width, options_.height);
+    });
+    report_.primary_rays += count_;
+    report_.primary_seconds += tracer_.trace({0, 0.0f}, rays_, hits_);
+
+    surfaces_.clear();
+    for (uint32_t i = 0; i < count_; ++i) {
+      if (std::isfinite(hits_[i].t)) {
+        surfaces_.push_back({i, {}, {}});
+      } else if (options_.effect == Effect::kAmbientOcclusion) {
+        add(i, glm::vec3(1.0f));
+      } else if (wants(Effect::kDirect)) {
+        add(i, sky_.radiance(to_glm(rays_[i].direction)));
+      }
+    }
+    for_each(surfaces_.size(), [&](size_t i) {
+      Surface& s = surfaces_[i];
+      s.point = scene_.surface(rays_[s.item], hits_[s.item]);
+      s.to_eye = -to_glm(rays_[s.item].direction);
+    });
+    if (options_.effect == Effect::kAmbientOcclusion) return render_occlusion();
+    if (wants(Effect::kDirect)) render_direct();
+    if (options_.effect != Effect::kDirect) render_indirect();
+  }
+
+  void render_occlusion() {
+    rays_.resize(surfaces_.size());
+    light_.resize(surfaces_.size());
+    const float reach = options_.ao_distance * scene_.diagonal();
+    for_each(surfaces_.size(), [&](size_t i) {
+      const Surface& s = surfaces_[i];
+      const glm::vec3 direction =
+          cosine_direction(s.point.shading_normal, random(s.item, kOcclusionDirection));
+      rays_[i] = ray_from(s.point, above(s.point, direction), reach);
+      light_[i] = {s.item, glm::vec3(1.0f)};
+    });
+    trace_light(indirect_flags_, true);
+  }
+
+  // Light from sky, sun and emitters at the surfaces the eye sees.
+  void render_direct() {
+    begin_light(surfaces_.size());
+    for_each(surfaces_.size(), [&](size_t i) {
+      const Surface& s = surfaces_[i];
+      make_light_rays(i, s.item, s.point, s.point.base_color * (1.0f - s.point.metallic), kDirectFirst);
+    });
+    end_light();
+    trace_light(0, false);
+    for (const Surface& s : surfaces_) add(s.item, s.point.emission);
+  }
+
+  void render_indirect() {
+    paths_.clear();
+    path_rays_.clear();
+    for (const Surface& s : surfaces_) {
+      if (wants(Effect::kDiffuse) && s.point.metallic < 1.0f)
+        paths_.push_back({s.item, false, glm::vec3(0.0f)});
+    }
+    const size_t diffuse = paths_.size();
+    for (const Surface& s : surfaces_) {
+      const bool shiny = s.point.roughness < kRoughestGlossy || s.point.metallic > 0.5f;
+      if (wants(Effect::kGlossy) && shiny) paths_.push_back({s.item, true, glm::vec3(0.0f)});
+    }
+    // Where an item's surface is.
+    surface_of_item_.assign(count_, 0);
+    for (uint32_t i = 0; i < surfaces_.size(); ++i) surface_of_item_[surfaces_[i].item] = i;
+    path_rays_.resize(paths_.size());
+    for_each(paths_.size(), [&](size_t i) {
+      const Surface& s = surfaces_[surface_of_item_[paths_[i].item]];
+      path_rays_[i] = i < diffuse ? start_diffuse(s, paths_[i]) : start_glossy(s, paths_[i]);
+    });
+    for (int bounce = 0; bounce < options_.bounces; ++bounce) follow_paths(bounce);
+  }
+
+  LspRay start_diffuse(const Surface& s, Path& path) const {
+    path.throughput = s.point.base_color * (1.0f - s.point.metallic);
+    const glm::vec3 direction = cosine_direction(s.point.shading_normal, random(s.item, kDiffuseDirection));
+    return ray_from(s.point, above(s.point, direction), kInfinity);
+  }
+
+  // One direction of the GGX lobe by visible normals (Heitz 2018); its weight is F G2 / G1.
+  LspRay start_glossy(const Surface& s, Path& path) const {
+    const glm::vec3 n = s.point.shading_normal;
+    glm::vec3 t;
+    glm::vec3 b;
+    make_frame(n, t, b);
+    const float alpha = std::max(s.point.roughness * s.point.roughness, 1e-3f);
+    const glm::vec3 v(glm::dot(s.to_eye, t), glm::dot(s.to_eye, b), std::max(glm::dot(s.to_eye, n), 1e-3f));
+    const glm::vec3 stretched = glm::normalize(glm::vec3(alpha * v.x, alpha * v.y, v.z));
+    glm::vec3 t1;
+    glm::vec3 t2;
+    make_frame(stretched, t1, t2);
+    const glm::vec2 u = random(s.item, kGlossyDirection);
+    const float r = std::sqrt(u.x);
+    const float p1 = r * std::cos(2.0f * kPi * u.y);
+    const float q = r * std::sin(2.0f * kPi * u.y);
+    // t1, t2 are any frame here; the half that is seen is chosen along the horizontal direction of the frame.
+    const float blend = 0.5f * (1.0f + stretched.z);
+    const glm::vec3 h1 =
+        stretched.z < 0.9999f ? glm::normalize(glm::cross(glm::vec3(0, 0, 1), stretched)) : t1;
+    const glm::vec3 h2 = glm::cross(stretched, h1);
+    const float p2 = (1.0f - blend) * std::sqrt(std::max(1.0f - p1 * p1, 0.0f)) + blend * q;
+    const glm::vec3 micro =
+        p1 * h1 + p2 * h2 + std::sqrt(std::max(1.0f - p1 * p1 - p2 * p2, 0.0f)) * stretched;
+    const glm::vec3 half =
+        glm::normalize(glm::vec3(alpha * micro.x, alpha * micro.y, std::max(micro.z, 1e-6f)));
+    const glm::vec3 l = 2.0f * glm::dot(v, half) * half - v;
+    const glm::vec3 f0 = glm::mix(glm::vec3(0.04f), s.point.base_color, s.point.metallic);
+    const float grazing = std::pow(1.0f - glm::clamp(glm::dot(v, half), 0.0f, 1.0f), 5.0f);
+    const auto lambda = [&](glm::vec3 w) {
+      const float tan2 = (w.x * w.x + w.y * w.y) / std::max(w.z * w.z, 1e-9f);
+      return 0.5f * (std::sqrt(1.0f + alpha * alpha * tan2) - 1.0f);
+    };
+    const float shadowing = l.z > 0 ? (1.0f + lambda(v)) / (1.0f + lambda(v) + lambda(l)) : 0.0f;
+    path.throughput = (f0 + (1.0f - f0) * grazing) * shadowing;
+    const glm::vec3 direction = glm::normalize(l.x * t + l.y * b + l.z * n);
+    return ray_from(s.point, above(s.point, direction), kInfinity);
+  }
+
+  void follow_paths(int bounce) {
+    path_hits_.resize(path_rays_.size());
+    report_.indirect_rays += path_rays_.size();
+    report_.indirect_seconds += tracer_.trace({indirect_flags_, options_.lod}, path_rays_, path_hits_);
+
+    // Paths that met a surface go on; the others end in the sky.
+    points_.resize(paths_.size());
+    for_each(paths_.size(), [&](size_t i) {
+      if (std::isfinite(path_hits_[i].t)) points_[i] = scene_.surface(path_rays_[i], path_hits_[i]);
+    });
+    size_t kept = 0;
+    for (size_t i = 0; i < paths_.size(); ++i) {
+      const Path path = paths_[i];
+      const bool mirrored = path.glossy && bounce == 0;
+      if (!std::isfinite(path_hits_[i].t)) {
+        if (mirrored) add(path.item, path.throughput * sky_.radiance(to_glm(path_rays_[i].direction)));
+        continue;
+      }
+      // What a diffuse surface gets straight from an emitter is direct light already.
+      if (mirrored) add(path.item, path.throughput * points_[i].emission);
+      paths_[kept] = path;
+      points_[kept] = points_[i];
+      ++kept;
+    }
+    paths_.resize(kept);
+    points_.resize(kept);
+
+    // Further surfaces are seen as diffuse, metals too: their mirror image of a mirror image would need
+    // another ray.
+    const uint32_t first = static_cast<uint32_t>(bounce) * kDimensionsPerBounce + kPathLightFirst;
+    begin_light(kept);
+    for_each(kept, [&](size_t i) {
+      Path& path = paths_[i];
+      path.throughput *= points_[i].base_color;
+      make_light_rays(i, path.item, points_[i], path.throughput, first + (path.glossy ? 3u : 0u));
+    });
+    end_light();
+    trace_light(indirect_flags_, true);
+
+    if (bounce + 1 == options_.bounces) return;
+    path_rays_.resize(kept);
+    for_each(kept, [&](size_t i) {
+      const uint32_t dimension = static_cast<uint32_t>(bounce + 1) * 2u * kDimensionsPerBounce +
+                                 kDiffuseDirection + (paths_[i].glossy ? 0x10000u : 0u);
+      const glm::vec3 direction =
+          cosine_direction(points_[i].shading_normal, random(paths_[i].item, dimension));
+      path_rays_[i] = ray_from(points_[i], above(points_[i], direction), kInfinity);
+    });
+  }
+
+  // ---- light rays: up to three slots a point, then packed together
+  // ------------------------------------------
+
+  void begin_light(size_t points) {
+    slots_.resize(3 * points);
+    slot_rays_.resize(3 * points);
+  }
+
+  void end_light() {
+    rays_.clear();
+    light_.clear();
+    for (size_t i = 0; i < slots_.size(); ++i) {
+      if (slots_[i].radiance == glm::vec3(0.0f)) continue;
+      rays_.push_back(slot_rays_[i]);
+      light_.push_back(slots_[i]);
+    }
+  }
+
+  // Fills the three slots of point `index`: a ray to the sky, one to the sun, one to an emitter; a slot whose
+  // light is black makes no ray. `weight`: what the point passes on of arriving light, albedo included.
+  void make_light_rays(size_t index, uint32_t item, const SurfacePoint& p, glm::vec3 weight,
+                       uint32_t dimension) {
+    LightRay* slot = &slots_[3 * index];
+    LspRay* ray = &slot_rays_[3 * index];
+    for (int i = 0; i < 3; ++i) slot[i] = {item, glm::vec3(0.0f)};
+
+    const glm::vec3 toward_sky = above(p, cosine_direction(p.shading_normal, random(item, dimension)));
+    slot[0].radiance = weight * sky_.radiance(toward_sky);
+    ray[0] = ray_from(p, toward_sky, kInfinity);
+
+    glm::vec3 t;
+    glm::vec3 b;
+    make_frame(sky_.sun_direction, t, b);
+    const glm::vec2 disc = random(item, dimension + 1);
+    const float r = std::sqrt(disc.x) * sky_.sun_radius_rad;
+    const glm::vec3 toward_sun = glm::normalize(sky_.sun_direction + r * std::cos(2.0f * kPi * disc.y) * t +
+                                                r * std::sin(2.0f * kPi * disc.y) * b);
+    const float sun_cosine = glm::dot(toward_sun, p.shading_normal);
+    if (sun_cosine > 0 && glm::dot(toward_sun, p.geometric_normal) > 0) {
+      slot[1].radiance = weight * sky_.sun_irradiance * (sun_cosine / kPi);
+      ray[1] = ray_from(p, toward_sun, kInfinity);
+    }
+
+    if (!scene_.has_emitters()) return;
+    const EmitterPoint emitter =
+        scene_.sample_emitter(random(item, dimension + 2).x, random(item, dimension + 2 + 0x20000u));
+    const glm::vec3 origin = p.position + offset_ * p.geometric_normal;
+    const glm::vec3 way = emitter.position - origin;
+    const float distance2 = glm::dot(way, way);
+    if (!(distance2 > 0) || !(emitter.pdf > 0)) return;
+    const glm::vec3 direction = way / std::sqrt(distance2);
+    const float here = glm::dot(direction, p.shading_normal);
+    const float there = std::abs(glm::dot(direction, emitter.normal));
+    if (here <= 0 || there <= 0 || glm::dot(direction, p.geometric_normal) <= 0) return;
+    slot[2].radiance = weight * emitter.radiance * (here * there / (distance2 * emitter.pdf * kPi));
+    // Ends just short of the emitter; t counts in lengths of `way`.
+    ray[2] = {from_glm(origin), 0.0f, from_glm(way), 0.999f};
+  }
+
+  void trace_light(uint32_t flags, bool indirect) {
+    hits_.resize(rays_.size());
+    const double seconds =
+        tracer_.trace({flags | LSP_TRACE_ANY_HIT, indirect ? options_.lod : 0.0f}, rays_, hits_);
+    (indirect ? report_.indirect_rays : report_.shadow_rays) += rays_.size();
+    (indirect ? report_.indirect_seconds : report_.shadow_seconds) += seconds;
+    for (size_t i = 0; i < light_.size(); ++i) {
+      if (!std::isfinite(hits_[i].t)) add(light_[i].item, light_[i].radiance);
+    }
+  }
+
+  const RenderScene& scene_;
+  const Sky& sky_;
+  const Camera& camera_;
+  const RenderOptions& options_;
+  RayTracer& tracer_;
+  RenderReport& report_;
+  tbb::task_arena arena_;
+  float offset_;  // rays start this far off their surface
+  uint32_t indirect_flags_ = 0;
+  Picture picture_;
+  std::vector<uint32_t> order_;
+
+  // The wave's state, kept from sample to sample for its memory.
+  size_t first_ = 0;
+  size_t count_ = 0;
+  uint32_t sample_ = 0;
+  std::vector<glm::vec3> sum_;
+  std::vector<LspRay> rays_;
+  std::vector<LspHit> hits_;
+  std::vector<Surface> surfaces_;
+  std::vector<uint32_t> surface_of_item_;
+  std::vector<Path> paths_;
+  std::vector<LspRay> path_rays_;
+  std::vector<LspHit> path_hits_;
+  std::vector<SurfacePoint> points_;
+  std::vector<LightRay> slots_;
+  std::vector<LspRay> slot_rays_;
+  std::vector<LightRay> light_;
+};
+
+}  // namespace
+
+Picture render(const RenderScene& scene, const Sky& sky, const Camera& camera, const RenderOptions& options,
+               RayTracer& tracer, RenderReport& report, const std::function<void(double)>& progress) {
+  return Renderer(scene, sky, camera, options, tracer, report).render(progress);
+}
+
+}  // namespace lsp::sample
