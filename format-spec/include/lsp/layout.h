@@ -204,11 +204,17 @@ LSP_END(LspMaterial)
  * a face is iu + N * iv, where u and v are the other two axes in increasing order. A shaft is
  *
  *   ((in * 5 + (out > in ? out - 1 : out)) * N^2 + patch_in) * N^2 + patch_out        in, out: faces
- */
+ *
+ * A binary Line Space (no bytes per entry) has bits only; a set bit says that something is inside. */
 #define LSP_SHAFT_INDEX(in_face, out_face, patch_in, patch_out, n)                                        \
   ((((in_face)*5u + ((out_face) > (in_face) ? (out_face)-1u : (out_face))) * ((n) * (n)) + (patch_in)) * \
        ((n) * (n)) +                                                                                      \
    (patch_out))
+
+/* Symmetric Line Spaces number the 15 unordered pairs of faces, the smaller face first. */
+#define LSP_SHAFT_INDEX_SYMMETRIC(low_face, high_face, patch_low, patch_high, n)                          \
+  ((((low_face) * (9u - (low_face)) / 2u + (high_face)-1u) * ((n) * (n)) + (patch_low)) * ((n) * (n)) + \
+   (patch_high))
 
 LSP_BEGIN(LspLineSpace)
   LSP_VEC3 lo; /* box of the shafts: the node's, with an outward margin */

@@ -1,0 +1,56 @@
+// From a mesh to the sections of an .lsp file.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "bvh.h"
+#include "line_space.h"
+#include "lsp/layout.h"
+#include "mesh.h"
+
+namespace lsp {
+
+// What the file is for: decides which features get a section.
+enum class Purpose {
+  kVisibility,  // any hit only: binary Line Spaces
+  kAo,          // any hit and distance: no normals, no materials
+  kDiffuse,
+  kGlossy,
+  kAll,
+};
+
+struct BakeOptions {
+  Purpose purpose = Purpose::kAll;
+  bool exact = true;         // keep the tree below the Line Spaces and every triangle
+  bool line_spaces = true;
+  BvhOptions bvh;
+  LineSpaceOptions line_space;
+  float plane_tolerance = 0.05f;       // LspHeader.plane_tolerance
+  float normal_angle_degrees = 180.0f;  // LspHeader.normal_angle_cos; 180: no hit is rejected
+  uint64_t memory_limit = 0;           // bytes, 0: none
+};
+
+// The sections of a file, and the header but for what the writer knows (sizes, offsets, hashes).
+struct Baked {
+  LspHeader header{};
+  std::vector<LspNode> nodes;
+  std::vector<LspTriangle> triangles;
+  std::vector<LspCornerNormals> normals;  // empty: no section
+  std::vector<LspMaterial> materials;     // empty: no section
+  LineSpaces line_spaces;
+  std::vector<std::string> skipped;       // what the scene did not need, in words
+  double tree_seconds = 0;
+  double line_space_seconds = 0;
+};
+
+// Called with the stage's name and the share of it done, from any thread.
+using Progress = std::function<void(std::string_view stage, double done)>;
+
+// Throws Failure with Exit::kLimit when the memory limit would be exceeded.
+Baked bake(const Mesh& mesh, const BakeOptions& options, const Progress& progress = {});
+
+}  // namespace lsp

@@ -1,0 +1,270 @@
+#include "line_space.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <atomic>
+#include <bit>
+#include <cmath>
+#include <glm/glm.hpp>
+
+#include "lsp/lsp.h"
+#include "lsp/program.h"
+
+namespace lsp {
+namespace {
+
+glm::vec3 vec(const lsp_float3& v) { return {v.x, v.y, v.z}; }
+lsp_float3 f3(const glm::vec3& v) { return {v.x, v.y, v.z}; }
+bool is_leaf(uint32_t child) { return (child & LSP_LEAF_BIT) != 0; }
+
+// Walks the tree depth first and picks the sites.
+class Chooser {
+ public:
+  Chooser(const Bvh& bvh, const LineSpaceOptions& options) : bvh_(bvh), options_(options) {
+    last_depth_ = *std::max_element(options.depths.begin(), options.depths.end());
+  }
+
+  // Returns the subtree's records as [first, end).
+  std::pair<uint32_t, uint32_t> visit(uint32_t child, const lsp_float3& lo, const lsp_float3& hi, uint32_t depth,
+                                      bool covered) {
+    const uint32_t count = count_records(child);
+    const bool small = !covered && depth <= last_depth_ && count < options_.triangles;
+    const bool at_depth = !is_leaf(child) && std::find(options_.depths.begin(), options_.depths.end(), depth) !=
+                                                 options_.depths.end();
+    size_t site = SIZE_MAX;
+    if ((small || at_depth) && !covered) {
+      site = sites.size();
+      sites.push_back({child, lo, hi, 0, count, true});
+    }
+    std::pair<uint32_t, uint32_t> range;
+    if (is_leaf(child)) {
+      const uint32_t first = child & LSP_LEAF_FIRST_MASK;
+      range = {first, first + count};
+    } else {
+      const LspNode& node = bvh_.nodes[child];
+      const bool stop = covered || small || depth >= last_depth_;
+      range.first = visit(node.child0, node.lo0, node.hi0, depth + 1, stop).first;
+      range.second = visit(node.child1, node.lo1, node.hi1, depth + 1, stop).second;
+    }
+    if (site != SIZE_MAX) {
+      sites[site].triangle_first = range.first;
+      sites[site].terminal = sites.size() == site + 1;
+    }
+    return range;
+  }
+
+  std::vector<LineSpaceSite> sites;
+
+ private:
+  // Records of a subtree: those of its last leaf's end less its first leaf's start.
+  uint32_t count_records(uint32_t child) const {
+    uint32_t first = child, last = child;
+    while (!is_leaf(first)) first = bvh_.nodes[first].child0;
+    while (!is_leaf(last)) last = bvh_.nodes[last].child1;
+    const uint32_t end =
+        (last & LSP_LEAF_FIRST_MASK) + ((last >> LSP_LEAF_COUNT_SHIFT) & LSP_LEAF_COUNT_MASK) + 1;
+    return end - (first & LSP_LEAF_FIRST_MASK);
+  }
+
+  const Bvh& bvh_;
+  const LineSpaceOptions& options_;
+  uint32_t last_depth_;
+};
+
+// One Line Space before it finds its place in the file.
+struct Filled {
+  LspLineSpace record;
+  std::vector<LspBitWord> words;
+  std::vector<uint32_t> candidates;
+};
+
+// The centroid of a patch. Faces and patches are numbered as in lsp/layout.h.
+glm::vec3 patch_centroid(const glm::vec3& lo, const glm::vec3& hi, uint32_t face, uint32_t patch, uint32_t n) {
+  const int axis = int(face / 2);
+  const int u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;
+  glm::vec3 p;
+  p[axis] = face % 2 ? hi[axis] : lo[axis];
+  p[u] = lo[u] + (hi[u] - lo[u]) * ((float(patch % n) + 0.5f) / float(n));
+  p[v] = lo[v] + (hi[v] - lo[v]) * ((float(patch / n) + 0.5f) / float(n));
+  return p;
+}
+
+// Fills one Line Space: for every shaft the triangle that the ray from the centroid of its start patch to the
+// centroid of its end patch hits first (paper, section 3.1).
+class Filler {
+ public:
+  Filler(const Bvh& bvh, const LspHeader& header, std::span<const LspTriangle> triangles, const LineSpaceSite& site,
+         const LineSpaceOptions& options)
+      : header_(header), options_(options), site_(site) {
+    header_.root = site.child;
+    header_.root_line_space = LSP_NONE;
+    header_.bounds_min = site.lo;
+    header_.bounds_max = site.hi;
+    header_.required_features = LSP_FEATURE_EXACT;
+    header_.node_count = uint32_t(bvh.nodes.size());
+    header_.triangle_count = uint32_t(triangles.size());
+    scene_.header = &header_;
+    scene_.nodes = bvh.nodes.data();
+    scene_.triangles = triangles.data();
+
+    // A flat box gets a thickness, and geometry on a side of the box comes to lie inside: far more than the
+    // rounding of a passage (lsp/traverse.h), far less than a patch.
+    const glm::vec3 lo = vec(site.lo), hi = vec(site.hi);
+    const glm::vec3 extent = hi - lo;
+    const glm::vec3 reach = glm::max(glm::abs(lo), glm::abs(hi));
+    const float margin = std::max({extent.x, extent.y, extent.z}) * 1e-4f +
+                         std::max({reach.x, reach.y, reach.z}) * 3.8146973e-6f;
+    lo_ = lo - margin;
+    hi_ = hi + margin;
+  }
+
+  Filled run() {
+    const uint32_t n = options_.resolution;
+    const bool binary = options_.kind == LineSpaceKind::kBinary;
+    const uint32_t shafts = (binary ? 15 : 30) * n * n * n * n;
+    std::vector<uint32_t> hit(shafts, LSP_NONE);
+    const uint32_t patches = n * n;
+    std::vector<glm::vec3> centroids(6 * patches);
+    for (uint32_t f = 0; f < 6; ++f)
+      for (uint32_t p = 0; p < patches; ++p) centroids[f * patches + p] = patch_centroid(lo_, hi_, f, p, n);
+
+    rays_.resize(patches);
+    hits_.resize(patches);
+    for (uint32_t in = 0; in < 6; ++in)
+      for (uint32_t out = binary ? in + 1 : 0; out < 6; ++out) {
+        if (in == out) continue;
+        for (uint32_t p = 0; p < patches; ++p) {
+          const glm::vec3 a = centroids[in * patches + p];
+          for (uint32_t q = 0; q < patches; ++q)
+            rays_[q] = {f3(a), 0.0f, f3(centroids[out * patches + q] - a), 1.0f};
+          const lsp_trace_options trace = {binary ? LSP_TRACE_ANY_HIT : 0u, 0.0f};
+          if (lsp_trace(&scene_, &trace, rays_.data(), hits_.data(), patches, nullptr, nullptr) != LSP_OK)
+            throw Failure(Exit::kInternal, "", "the tracer refused the baker's own tree");
+          const uint32_t base =
+              binary ? LSP_SHAFT_INDEX_SYMMETRIC(in, out, p, 0u, n) : LSP_SHAFT_INDEX(in, out, p, 0u, n);
+          for (uint32_t q = 0; q < patches; ++q) hit[base + q] = hits_[q].primitive;
+        }
+      }
+    return pack(hit);
+  }
+
+ private:
+  Filled pack(const std::vector<uint32_t>& hit) const {
+    const uint32_t n = options_.resolution;
+    const uint32_t shafts = uint32_t(hit.size());
+    const uint32_t filled = uint32_t(shafts - size_t(std::count(hit.begin(), hit.end(), LSP_NONE)));
+    const bool binary = options_.kind == LineSpaceKind::kBinary;
+    const uint32_t bytes = binary ? 0 : site_.triangle_count < 0xFF ? 1 : site_.triangle_count < 0xFFFF ? 2 : 4;
+    const uint32_t word_count = (shafts + 31) / 32;
+    // Section 3.1: the sparse layout costs two words per 32 shafts, the dense one an entry per empty shaft.
+    const bool dense =
+        !binary && uint64_t(shafts) * bytes < uint64_t(word_count) * sizeof(LspBitWord) + uint64_t(filled) * bytes;
+
+    Filled result;
+    const glm::vec3 scale = float(n) / (hi_ - lo_);
+    result.record = {f3(lo_),       0,
+                     f3(hi_),       0,
+                     f3(scale),     site_.triangle_first,
+                     n | bytes << LSP_FORMAT_ENTRY_SHIFT | (dense ? LSP_FORMAT_DENSE : 0) |
+                         (binary ? LSP_FORMAT_SYMMETRIC : 0),
+                     filled,        site_.triangle_count,
+                     site_.child};
+    if (!dense) {
+      result.words.resize(word_count);
+      uint32_t offset = 0;
+      for (uint32_t w = 0; w < word_count; ++w) {
+        uint32_t bits = 0;
+        for (uint32_t b = 0; b < 32 && w * 32 + b < shafts; ++b)
+          if (hit[w * 32 + b] != LSP_NONE) bits |= 1u << b;
+        result.words[w] = {bits, offset};
+        offset += uint32_t(std::popcount(bits));
+      }
+    }
+    if (!binary) {
+      const uint32_t entries = dense ? shafts : filled;
+      const uint32_t per_word = 4 / bytes;
+      result.candidates.assign((entries + per_word - 1) / per_word, 0);
+      uint32_t entry = 0;
+      for (uint32_t s = 0; s < shafts; ++s) {
+        if (hit[s] == LSP_NONE && !dense) continue;
+        const uint32_t mask = bytes == 4 ? LSP_NONE : (1u << bytes * 8) - 1;
+        const uint32_t value = hit[s] == LSP_NONE ? mask : hit[s] - site_.triangle_first;
+        result.candidates[entry / per_word] |= value << (entry % per_word) * bytes * 8;
+        ++entry;
+      }
+    }
+    return result;
+  }
+
+  LspHeader header_;
+  const LineSpaceOptions& options_;
+  const LineSpaceSite& site_;
+  lsp_scene scene_{};
+  glm::vec3 lo_, hi_;
+  std::vector<LspRay> rays_;
+  std::vector<LspHit> hits_;
+};
+
+}  // namespace
+
+std::vector<LineSpaceSite> choose_sites(const Bvh& bvh, const LspHeader& header, const LineSpaceOptions& options) {
+  if (bvh.root == LSP_NONE || options.depths.empty()) return {};
+  Chooser chooser(bvh, options);
+  chooser.visit(bvh.root, header.bounds_min, header.bounds_max, 0, false);
+  return std::move(chooser.sites);
+}
+
+LineSpaces fill_line_spaces(Bvh& bvh, RootReference& root, const LspHeader& header,
+                            std::span<const LspTriangle> triangles, const std::vector<LineSpaceSite>& sites,
+                            const LineSpaceOptions& options, const std::function<void(double)>& progress) {
+  // The tracer answers with primitives; here it is to answer with records.
+  std::vector<LspTriangle> numbered(triangles.begin(), triangles.end());
+  for (size_t i = 0; i < numbered.size(); ++i) numbered[i].primitive = uint32_t(i);
+
+  std::vector<Filled> filled(sites.size());
+  std::atomic<size_t> done{0};
+  tbb::parallel_for(size_t(0), sites.size(), [&](size_t i) {
+    filled[i] = Filler(bvh, header, numbered, sites[i], options).run();
+    const size_t now = ++done;
+    if (progress && now % 16 == 0) progress(double(now) / double(sites.size()));
+  });
+
+  LineSpaces all;
+  const uint32_t n = options.resolution;
+  const uint64_t shafts = (options.kind == LineSpaceKind::kBinary ? 15ull : 30ull) * n * n * n * n;
+  // References by child: a child reference names its node or leaf uniquely.
+  std::vector<std::pair<uint32_t, uint32_t>> references;
+  for (size_t i = 0; i < sites.size(); ++i) {
+    Filled& f = filled[i];
+    if (f.record.filled == 0) {
+      ++all.dropped;
+      continue;
+    }
+    if (all.words.size() + f.words.size() > LSP_NONE || all.candidates.size() + f.candidates.size() > LSP_NONE)
+      throw Failure(Exit::kLimit, "", "the Line Spaces need more than 2^32 words, lower --resolution or --depth");
+    f.record.word_first = f.words.empty() ? 0 : uint32_t(all.words.size());
+    f.record.candidate_first = f.candidates.empty() ? 0 : uint32_t(all.candidates.size());
+    all.words.insert(all.words.end(), f.words.begin(), f.words.end());
+    all.candidates.insert(all.candidates.end(), f.candidates.begin(), f.candidates.end());
+    all.shafts += shafts;
+    all.filled += f.record.filled;
+    all.dense += (f.record.format & LSP_FORMAT_DENSE) ? 1 : 0;
+    references.emplace_back(sites[i].child, uint32_t(all.records.size()) | (sites[i].terminal ? LSP_TERMINAL_BIT : 0));
+    all.records.push_back(f.record);
+    f = {};
+  }
+  std::sort(references.begin(), references.end());
+  const auto reference_of = [&](uint32_t child) {
+    const auto it = std::lower_bound(references.begin(), references.end(), std::pair(child, 0u));
+    return it != references.end() && it->first == child ? it->second : LSP_NONE;
+  };
+  root.line_space = reference_of(bvh.root);
+  for (LspNode& node : bvh.nodes) {
+    node.line_space0 = reference_of(node.child0);
+    node.line_space1 = reference_of(node.child1);
+  }
+  return all;
+}
+
+}  // namespace lsp

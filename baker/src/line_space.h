@@ -1,0 +1,63 @@
+// Line Spaces with representative candidates on chosen nodes of the base structure.
+//
+// Keul, Koss, Mueller, "Fast Indirect Lighting Approximations using the Representative Candidate Line Space",
+// 2018, section 3. The numbering of patches and shafts, and the sparse layout, are in lsp/layout.h.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "bvh.h"
+#include "lsp/layout.h"
+
+namespace lsp {
+
+enum class LineSpaceKind {
+  kCandidates,  // a representative triangle per shaft and direction
+  kBinary,      // one bit per shaft, both directions together: enough for visibility
+};
+
+struct LineSpaceOptions {
+  LineSpaceKind kind = LineSpaceKind::kCandidates;
+  uint32_t resolution = 6;            // N: patches along an edge of the box, 1 to LSP_MAX_RESOLUTION
+  std::vector<uint32_t> depths = {9};  // D: inner nodes at these depths carry a Line Space (the root is at 0)
+  uint32_t triangles = 0;             // T: so does a node above the last depth with fewer triangles than this
+};
+
+// A node that carries a Line Space.
+struct LineSpaceSite {
+  uint32_t child;           // its child reference
+  lsp_float3 lo, hi;        // its box
+  uint32_t triangle_first;  // its subtree's records
+  uint32_t triangle_count;
+  bool terminal;  // no site below
+};
+
+struct LineSpaces {
+  std::vector<LspLineSpace> records;
+  std::vector<LspBitWord> words;
+  std::vector<uint32_t> candidates;  // entries packed into words
+  uint64_t shafts = 0;               // of all Line Spaces
+  uint64_t filled = 0;
+  uint64_t dense = 0;    // Line Spaces in the dense layout
+  uint64_t dropped = 0;  // sites whose Line Space had no filled shaft
+};
+
+// The root's Line Space reference, set by attach_line_spaces; the other nodes' are in bvh.nodes.
+struct RootReference {
+  uint32_t line_space = LSP_NONE;
+};
+
+// The nodes of `bvh` that are to carry a Line Space, in depth-first order.
+std::vector<LineSpaceSite> choose_sites(const Bvh& bvh, const LspHeader& header, const LineSpaceOptions& options);
+
+// Computes the Line Space of every site on all threads of the current oneTBB arena and writes the references
+// into `bvh.nodes` and `root`. `triangles` are the tree's records. The result does not depend on the number
+// of threads. `progress` is called with the share done, from any thread.
+LineSpaces fill_line_spaces(Bvh& bvh, RootReference& root, const LspHeader& header,
+                            std::span<const LspTriangle> triangles, const std::vector<LineSpaceSite>& sites,
+                            const LineSpaceOptions& options, const std::function<void(double)>& progress = {});
+
+}  // namespace lsp

@@ -1,0 +1,239 @@
+// lsp-bake: turns meshes into an .lsp file.
+#include <fcntl.h>
+#include <sys/resource.h>
+#include <tbb/global_control.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cinttypes>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "bake.h"
+#include "import/import.h"
+#include "lsp/command_line.h"
+#include "writer.h"
+
+namespace {
+
+using namespace lsp;
+using Json = nlohmann::ordered_json;
+
+struct Arguments {
+  std::vector<std::filesystem::path> inputs;
+  std::filesystem::path output;
+  std::string base = "bvh";
+  uint32_t resolution = 6;
+  std::vector<uint32_t> depths = {9};
+  uint32_t triangles = 0;
+  Purpose purpose = Purpose::kAll;
+  bool no_exact = false;
+  bool exact = false;
+  bool no_line_spaces = false;
+  std::string compress = "none";
+  uint32_t align = 4096;
+  uint32_t threads = 0;
+  uint64_t memory_limit = 0;
+  float normal_angle = 180;
+  float plane_tolerance = 0.05f;
+  float crease_angle = 40;
+  bool no_splits = false;
+  CommonOptions common;
+};
+
+std::string hex128(uint64_t lo, uint64_t hi) {
+  char text[33];
+  std::snprintf(text, sizeof text, "%016" PRIx64 "%016" PRIx64, hi, lo);
+  return text;
+}
+
+std::string megabytes(uint64_t bytes) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.2f MB", double(bytes) / 1e6);
+  return text;
+}
+
+// Provenance: nothing in it depends on the machine, the time, the threads or the folder.
+Json provenance(const Arguments& a, const Mesh& mesh, const std::array<uint64_t, 2>& source) {
+  Json inputs = Json::array();
+  for (const auto& p : a.inputs) inputs.push_back(p.filename().string());
+  Json materials = Json::array();
+  for (const Material& m : mesh.materials) materials.push_back(m.name);
+  static const std::map<Purpose, const char*> kPurposes = {{Purpose::kVisibility, "visibility"},
+                                                           {Purpose::kAo, "ao"},
+                                                           {Purpose::kDiffuse, "diffuse"},
+                                                           {Purpose::kGlossy, "glossy"},
+                                                           {Purpose::kAll, "all"}};
+  return {{"generator", std::string("lsp-bake ") + kProgramVersion},
+          {"inputs", inputs},
+          {"source_hash", hex128(source[0], source[1])},
+          {"options",
+           {{"base", a.base},
+            {"resolution", a.resolution},
+            {"depth", a.depths},
+            {"triangles", a.triangles},
+            {"for", kPurposes.at(a.purpose)},
+            {"exact", !a.no_exact},
+            {"line_spaces", !a.no_line_spaces},
+            {"spatial_splits", !a.no_splits},
+            {"normal_angle", a.normal_angle},
+            {"plane_tolerance", a.plane_tolerance},
+            {"crease_angle", a.crease_angle}}},
+          {"triangles",
+           {{"read", mesh.primitive_count},
+            {"kept", mesh.triangles.size()},
+            {"degenerate", mesh.rejected.degenerate},
+            {"non_finite", mesh.rejected.non_finite},
+            {"out_of_range", mesh.rejected.out_of_range}}},
+          {"materials", materials}};
+}
+
+Exit run(const Arguments& a) {
+  if (a.exact && a.no_exact) throw Failure(Exit::kUsage, "", "--exact and --no-exact exclude each other");
+  if (a.base == "ntree")
+    throw Failure(Exit::kUnsupported, "", "the base structure ntree is not built by this version, use --base bvh");
+  if (a.no_line_spaces && a.no_exact)
+    throw Failure(Exit::kUsage, "", "--no-line-spaces with --no-exact leaves nothing to trace");
+  std::unique_ptr<tbb::global_control> control;
+  if (a.threads)
+    control = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism, a.threads);
+  ProgressBar bar(!a.common.quiet && !a.common.json);
+  const auto clock = [start = std::chrono::steady_clock::now()]() mutable {
+    const auto now = std::chrono::steady_clock::now();
+    const double s = std::chrono::duration<double>(now - start).count();
+    start = now;
+    return s;
+  };
+  auto timer = clock;
+
+  bar.show("import", 0);
+  ImportOptions import_options;
+  import_options.memory_limit = a.memory_limit;
+  import_options.crease_angle_degrees = a.crease_angle;
+  const Mesh mesh = import_meshes(a.inputs, import_options);
+  const auto source = hash_inputs(a.inputs);
+  const double import_seconds = timer();
+
+  BakeOptions options;
+  options.purpose = a.purpose;
+  options.exact = !a.no_exact;
+  options.line_spaces = !a.no_line_spaces;
+  options.bvh.spatial_splits = !a.no_splits;
+  options.line_space.resolution = a.resolution;
+  options.line_space.depths = a.depths;
+  options.line_space.triangles = a.triangles;
+  options.line_space.kind =
+      a.purpose == Purpose::kVisibility ? LineSpaceKind::kBinary : LineSpaceKind::kCandidates;
+  options.normal_angle_degrees = a.normal_angle;
+  options.plane_tolerance = a.plane_tolerance;
+  options.memory_limit = a.memory_limit;
+  Baked baked = bake(mesh, options, [&](std::string_view stage, double done) { bar.show(stage, done); });
+  baked.header.source_hash_lo = source[0];
+  baked.header.source_hash_hi = source[1];
+  timer();
+
+  bar.show("write", 0);
+  const Json meta = provenance(a, mesh, source);
+  const Written written = write_lsp(a.output, baked, meta.dump(), {a.align, a.compress == "zstd", 12});
+  const double write_seconds = timer();
+  bar.clear();
+
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  const uint64_t peak = uint64_t(usage.ru_maxrss) * 1024;
+  const LineSpaces& ls = baked.line_spaces;
+  if (a.common.json) {
+    Json sections = Json::array();
+    for (const WrittenSection& s : written.sections)
+      sections.push_back({{"name", s.name}, {"bytes", s.bytes}, {"stored_bytes", s.stored_bytes}});
+    Json report = {{"output", a.output.string()},
+                   {"triangles", meta["triangles"]},
+                   {"notes", mesh.notes},
+                   {"skipped", baked.skipped},
+                   {"nodes", baked.header.node_count},
+                   {"triangle_records", baked.header.triangle_count},
+                   {"depth", baked.header.max_depth},
+                   {"line_spaces", baked.header.line_space_count},
+                   {"shafts", ls.shafts},
+                   {"filled_shafts", ls.filled},
+                   {"dense_line_spaces", ls.dense},
+                   {"seconds",
+                    {{"import", import_seconds},
+                     {"base_structure", baked.tree_seconds},
+                     {"line_spaces", baked.line_space_seconds},
+                     {"write", write_seconds}}},
+                   {"peak_memory_bytes", peak},
+                   {"file_bytes", written.file_bytes},
+                   {"content_hash", hex128(baked.header.content_hash_lo, baked.header.content_hash_hi)},
+                   {"sections", sections}};
+    std::cout << report.dump(2) << "\n";
+  } else if (!a.common.quiet) {
+    std::printf("read        %" PRIu64 " triangles, kept %zu\n", mesh.primitive_count, mesh.triangles.size());
+    if (mesh.rejected.total())
+      std::printf("dropped     %" PRIu64 " degenerate, %" PRIu64 " non-finite, %" PRIu64 " with an index out of range\n",
+                  mesh.rejected.degenerate, mesh.rejected.non_finite, mesh.rejected.out_of_range);
+    for (const std::string& note : mesh.notes) std::printf("note        %s\n", note.c_str());
+    std::printf("tree        %u nodes, %u triangle records, depth %u\n", baked.header.node_count,
+                baked.header.triangle_count, baked.header.max_depth);
+    if (baked.header.line_space_count)
+      std::printf("Line Spaces %u, %.1f %% of the shafts filled\n", baked.header.line_space_count,
+                  100.0 * double(ls.filled) / double(std::max<uint64_t>(1, ls.shafts)));
+    for (const std::string& s : baked.skipped) std::printf("skipped     %s\n", s.c_str());
+    std::printf("time        import %.2f s, tree %.2f s, Line Spaces %.2f s, write %.2f s; peak memory %s\n",
+                import_seconds, baked.tree_seconds, baked.line_space_seconds, write_seconds, megabytes(peak).c_str());
+    for (const WrittenSection& s : written.sections) {
+      std::printf("section     %s %12s", s.name.c_str(), megabytes(s.bytes).c_str());
+      if (s.stored_bytes != s.bytes) std::printf(", packed %s", megabytes(s.stored_bytes).c_str());
+      std::printf("\n");
+    }
+    std::printf("wrote       %s, %s\n", a.output.c_str(), megabytes(written.file_bytes).c_str());
+    std::fflush(stdout);
+  }
+  return Exit::kDone;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Arguments a;
+  CLI::App app("Bakes meshes (.gltf .glb .obj .ply .stl .off) into an .lsp file.", "lsp-bake");
+  app.option_defaults()->always_capture_default();
+  app.add_option("INPUT", a.inputs, "Mesh files, read in this order")->required();
+  app.add_option("-o,--output", a.output, "The .lsp file to write")->required();
+  app.add_option("--base", a.base, "Base structure")->check(CLI::IsMember({"bvh", "ntree"}));
+  app.add_option("--resolution", a.resolution, "N: patches along an edge of a Line Space's box")
+      ->check(CLI::Range(1u, LSP_MAX_RESOLUTION));
+  app.add_option("--depth", a.depths, "D: depth of the nodes with a Line Space; several, as 6,9,12, give levels of detail")
+      ->delimiter(',')
+      ->check(CLI::Range(0u, 40u));
+  app.add_option("--triangles", a.triangles, "T: nodes above D with fewer triangles get a Line Space too");
+  app.add_option("--for", a.purpose, "What the file is for")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, Purpose>{{"visibility", Purpose::kVisibility},
+                                                                         {"ao", Purpose::kAo},
+                                                                         {"diffuse", Purpose::kDiffuse},
+                                                                         {"glossy", Purpose::kGlossy},
+                                                                         {"all", Purpose::kAll}}))
+      ->default_str("all");
+  app.add_flag("--exact", a.exact, "Keep the exact tree below the Line Spaces (the default)");
+  app.add_flag("--no-exact", a.no_exact, "Keep only what approximate rays need");
+  app.add_flag("--no-line-spaces", a.no_line_spaces, "Bake the exact tree alone");
+  app.add_option("--compress", a.compress, "Pack the sections")->check(CLI::IsMember({"none", "zstd"}));
+  app.add_option("--align", a.align, "Alignment of sections in bytes")->check(CLI::IsMember({256, 4096, 65536}));
+  app.add_option("--threads", a.threads, "Threads, 0: all cores");
+  app.add_option("--memory-limit", a.memory_limit, "Memory the bake may use, as 2GiB; 0: no limit")
+      ->transform(CLI::AsSizeValue(false));
+  app.add_option("--normal-angle", a.normal_angle,
+                 "Reject a plane hit whose extrapolated normal is further from the candidate's mean normal, in "
+                 "degrees; 180: never")
+      ->check(CLI::Range(0.0f, 180.0f));
+  app.add_option("--plane-tolerance", a.plane_tolerance,
+                 "How far outside its box a plane hit may lie, in diagonals of the box")
+      ->check(CLI::Range(0.0f, 1e6f));
+  app.add_option("--crease-angle", a.crease_angle, "Smooth normals are made up to this angle, in degrees")
+      ->check(CLI::Range(0.0f, 180.0f));
+  app.add_flag("--no-splits", a.no_splits, "Build the tree without spatial splits");
+  add_common_options(app, "lsp-bake", a.common);
+  return run_program("lsp-bake", app, argc, argv, [&] { return run(a); });
+}

@@ -1,0 +1,186 @@
+#include "writer.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <xxhash.h>
+#include <zstd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <memory>
+#include <span>
+
+#include "lsp/program.h"
+
+namespace lsp {
+namespace {
+
+struct Section {
+  const char* name;
+  uint32_t type;
+  uint32_t element_bytes;
+  bool required;
+  std::span<const std::byte> bytes;
+  std::vector<std::byte> packed;
+  std::span<const std::byte> stored() const { return packed.empty() ? bytes : std::span<const std::byte>(packed); }
+};
+
+uint64_t align_up(uint64_t x, uint64_t alignment) { return (x + alignment - 1) / alignment * alignment; }
+
+std::vector<std::byte> compress(std::span<const std::byte> bytes, int level) {
+  const std::unique_ptr<ZSTD_CCtx, size_t (*)(ZSTD_CCtx*)> context(ZSTD_createCCtx(), ZSTD_freeCCtx);
+  std::vector<std::byte> out(ZSTD_compressBound(bytes.size()));
+  const size_t size = ZSTD_compressCCtx(context.get(), out.data(), out.size(), bytes.data(), bytes.size(), level);
+  if (ZSTD_isError(size)) throw Failure(Exit::kInternal, "", std::string("zstd: ") + ZSTD_getErrorName(size));
+  out.resize(size);
+  return out;
+}
+
+// What the content id covers of a section: nothing that depends on packing or alignment.
+struct ContentEntry {
+  uint32_t type, element_bytes;
+  uint64_t element_count, bytes, hash_lo, hash_hi;
+};
+static_assert(sizeof(ContentEntry) == 40);
+
+// A file under a temporary name until commit().
+class TemporaryFile {
+ public:
+  explicit TemporaryFile(const std::filesystem::path& path) : path_(path), temporary_(path) {
+    temporary_ += ".XXXXXX";
+    std::string name = temporary_.string();
+    fd_ = mkstemp(name.data());
+    temporary_ = name;
+    if (fd_ < 0) fail("cannot write here");
+    fchmod_default();
+  }
+  ~TemporaryFile() {
+    if (fd_ >= 0) {
+      close(fd_);
+      unlink(temporary_.c_str());
+    }
+  }
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+
+  void write(const void* data, size_t size) {
+    const char* p = static_cast<const char*>(data);
+    while (size > 0) {
+      const ssize_t n = ::write(fd_, p, size);
+      if (n < 0 && errno == EINTR) continue;
+      if (n <= 0) fail("cannot write");
+      p += n;
+      size -= size_t(n);
+      position_ += uint64_t(n);
+    }
+  }
+  void pad_to(uint64_t position) {
+    static const char zeros[4096] = {};
+    while (position_ < position) write(zeros, size_t(std::min<uint64_t>(sizeof zeros, position - position_)));
+  }
+  void commit() {
+    if (fsync(fd_) != 0) fail("cannot write");
+    if (rename(temporary_.c_str(), path_.c_str()) != 0) fail("cannot replace the file");
+    close(fd_);
+    fd_ = -1;
+  }
+
+ private:
+  void fchmod_default() {
+    const mode_t mask = umask(0);
+    umask(mask);
+    (void)!fchmod(fd_, 0666 & ~mask);
+  }
+  [[noreturn]] void fail(const char* what) {
+    throw Failure(Exit::kFile, path_.string(),
+                  std::string(what) + ": " + std::strerror(errno) + "; give another place with -o or make room");
+  }
+
+  std::filesystem::path path_, temporary_;
+  int fd_ = -1;
+  uint64_t position_ = 0;
+};
+
+}  // namespace
+
+Written write_lsp(const std::filesystem::path& path, Baked& baked, const std::string& meta,
+                  const WriteOptions& options) {
+  std::vector<Section> sections;
+  const auto add = [&](const char* name, uint32_t type, uint32_t element_bytes, bool required, const void* data,
+                       size_t bytes) {
+    if (bytes == 0) return;
+    sections.push_back({name, type, element_bytes, required, {static_cast<const std::byte*>(data), bytes}, {}});
+  };
+  const auto add_vector = [&](const char* name, uint32_t type, bool required, const auto& v) {
+    add(name, type, uint32_t(sizeof v[0]), required, v.data(), v.size() * sizeof v[0]);
+  };
+  add_vector("NODE", LSP_SECTION_NODE, true, baked.nodes);
+  add_vector("TRIA", LSP_SECTION_TRIA, true, baked.triangles);
+  add_vector("NRML", LSP_SECTION_NRML, true, baked.normals);
+  add_vector("MATL", LSP_SECTION_MATL, true, baked.materials);
+  add_vector("LSPC", LSP_SECTION_LSPC, true, baked.line_spaces.records);
+  add_vector("BITS", LSP_SECTION_BITS, true, baked.line_spaces.words);
+  add_vector("CAND", LSP_SECTION_CAND, true, baked.line_spaces.candidates);
+  add("META", LSP_SECTION_META, 1, false, meta.data(), meta.size());
+
+  bool any_packed = false;
+  if (options.zstd)
+    for (Section& s : sections) {
+      s.packed = compress(s.bytes, options.zstd_level);
+      if (s.packed.size() >= s.bytes.size()) s.packed.clear();
+      any_packed |= !s.packed.empty();
+    }
+
+  // The header states the raw form's alignment; a packed file is never mapped and lies closer.
+  const uint64_t alignment = any_packed ? 256 : options.alignment;
+  LspHeader& h = baked.header;
+  h.magic_0 = LSP_MAGIC_0;
+  h.magic_1 = LSP_MAGIC_1;
+  h.version_major = LSP_VERSION_MAJOR;
+  h.version_minor = LSP_VERSION_MINOR;
+  h.header_bytes = sizeof(LspHeader);
+  h.section_count = uint32_t(sections.size());
+  h.section_table_offset = sizeof(LspHeader);
+  h.alignment = options.alignment;
+
+  std::vector<LspSection> table;
+  std::vector<ContentEntry> content;
+  uint64_t position = sizeof(LspHeader) + sections.size() * sizeof(LspSection);
+  for (const Section& s : sections) {
+    const XXH128_hash_t hash = XXH3_128bits(s.bytes.data(), s.bytes.size());
+    const uint64_t count = s.bytes.size() / s.element_bytes;
+    position = align_up(position, alignment);
+    table.push_back({s.type, s.required ? LSP_SECTION_REQUIRED : 0u, position, s.stored().size(), s.bytes.size(),
+                     s.packed.empty() ? LSP_CODEC_NONE : LSP_CODEC_ZSTD, s.element_bytes, count, hash.low64,
+                     hash.high64});
+    content.push_back({s.type, s.element_bytes, count, s.bytes.size(), hash.low64, hash.high64});
+    position += s.stored().size();
+  }
+  h.file_bytes = align_up(position, alignment);
+  const XXH128_hash_t content_hash = XXH3_128bits(content.data(), content.size() * sizeof(ContentEntry));
+  h.content_hash_lo = content_hash.low64;
+  h.content_hash_hi = content_hash.high64;
+  h.header_hash_lo = h.header_hash_hi = 0;
+  std::vector<std::byte> head(sizeof h + table.size() * sizeof(LspSection));
+  std::memcpy(head.data(), &h, sizeof h);
+  std::memcpy(head.data() + sizeof h, table.data(), table.size() * sizeof(LspSection));
+  const XXH128_hash_t header_hash = XXH3_128bits(head.data(), head.size());
+  h.header_hash_lo = header_hash.low64;
+  h.header_hash_hi = header_hash.high64;
+  std::memcpy(head.data(), &h, sizeof h);
+
+  TemporaryFile file(path);
+  file.write(head.data(), head.size());
+  Written written{h.file_bytes, {}};
+  for (size_t i = 0; i < sections.size(); ++i) {
+    file.pad_to(table[i].offset);
+    file.write(sections[i].stored().data(), sections[i].stored().size());
+    written.sections.push_back({sections[i].name, sections[i].bytes.size(), sections[i].stored().size()});
+  }
+  file.pad_to(h.file_bytes);
+  file.commit();
+  return written;
+}
+
+}  // namespace lsp

@@ -1,0 +1,36 @@
+// Writes an .lsp file: header, section table, sections (format-spec/SPEC.md).
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "bake.h"
+
+namespace lsp {
+
+struct WriteOptions {
+  uint32_t alignment = 4096;  // 256, 4096 or 65536
+  bool zstd = false;          // pack the sections; a packed file cannot be mapped, only unpacked
+  int zstd_level = 12;
+};
+
+struct WrittenSection {
+  std::string name;
+  uint64_t bytes;
+  uint64_t stored_bytes;
+};
+
+struct Written {
+  uint64_t file_bytes;
+  std::vector<WrittenSection> sections;
+};
+
+// Completes `baked.header` (sizes, offsets, hashes) and writes the file. It is written beside `path` under
+// another name, synced and renamed: an interrupted or failed write leaves an older file at `path` whole.
+// `meta` is the provenance, UTF-8 JSON. Throws Failure with Exit::kFile.
+Written write_lsp(const std::filesystem::path& path, Baked& baked, const std::string& meta,
+                  const WriteOptions& options);
+
+}  // namespace lsp

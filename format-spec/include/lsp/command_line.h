@@ -1,0 +1,92 @@
+// The part of a command line that all programs share: CLI11 with the project's exit codes, common options and
+// a progress bar. A program that includes this links CLI11.
+#pragma once
+
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <functional>
+#include <iostream>
+#include <mutex>
+#include <new>
+#include <string>
+#include <string_view>
+
+#include "lsp/layout.h"
+#include "lsp/program.h"
+
+namespace lsp {
+
+struct CommonOptions {
+  bool quiet = false;  // no progress, no figures
+  bool json = false;   // one JSON object on standard output and nothing else there
+};
+
+// Adds --version, --quiet and --json.
+inline void add_common_options(CLI::App& app, const char* program, CommonOptions& options) {
+  app.set_version_flag("--version", std::string(program) + " " + kProgramVersion + ", format " +
+                                        std::to_string(LSP_VERSION_MAJOR) + "." +
+                                        std::to_string(LSP_VERSION_MINOR));
+  app.add_flag("--quiet", options.quiet, "Print nothing but errors");
+  app.add_flag("--json", options.json, "Print one JSON object on standard output");
+}
+
+// Parses, runs `body` and returns its exit code; turns what is thrown into a message on standard error.
+inline int run_program(const char* program, CLI::App& app, int argc, char** argv,
+                       const std::function<Exit()>& body) {
+  try {
+    app.parse(argc, argv);
+    const Exit exit = body();
+    std::cout.flush();
+    if (!std::cout) throw Failure(Exit::kFile, "standard output", "cannot write, is the disk full?");
+    return static_cast<int>(exit);
+  } catch (const CLI::Success& e) {  // --help, --version
+    app.exit(e);
+    return static_cast<int>(Exit::kDone);
+  } catch (const CLI::ParseError& e) {
+    std::cerr << program << ": " << e.what() << "; see " << program << " --help\n";
+    return static_cast<int>(Exit::kUsage);
+  } catch (const Failure& e) {
+    std::cerr << program << ": " << (e.file().empty() ? "" : e.file() + ": ") << e.what() << "\n";
+    return static_cast<int>(e.exit());
+  } catch (const std::bad_alloc&) {
+    std::cerr << program << ": out of memory; use a smaller input or a machine with more memory\n";
+    return static_cast<int>(Exit::kLimit);
+  } catch (const std::exception& e) {
+    std::cerr << program << ": internal error: " << e.what() << "; please report it\n";
+    return static_cast<int>(Exit::kInternal);
+  }
+}
+
+// A bar on standard error while that is a terminal; silent otherwise. May be called from any thread.
+class ProgressBar {
+ public:
+  explicit ProgressBar(bool wanted) : shown_(wanted && isatty(STDERR_FILENO)) {}
+  ~ProgressBar() { clear(); }
+  ProgressBar(const ProgressBar&) = delete;
+  ProgressBar& operator=(const ProgressBar&) = delete;
+
+  void show(std::string_view stage, double done) {
+    if (!shown_) return;
+    const std::lock_guard lock(mutex_);
+    constexpr int kWidth = 40;
+    const int filled = done < 0 ? 0 : done > 1 ? kWidth : int(done * kWidth);
+    std::fprintf(stderr, "\r%-16.*s [%.*s%*s] %3d %%", int(stage.size()), stage.data(), filled,
+                 "########################################", kWidth - filled, "", int(done * 100));
+    std::fflush(stderr);
+    drawn_ = true;
+  }
+  void clear() {
+    const std::lock_guard lock(mutex_);
+    if (drawn_) std::fprintf(stderr, "\r\033[K");
+    drawn_ = false;
+  }
+
+ private:
+  const bool shown_;
+  bool drawn_ = false;
+  std::mutex mutex_;
+};
+
+}  // namespace lsp
