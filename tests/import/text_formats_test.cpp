@@ -1,0 +1,435 @@
+// OBJ, PLY, STL and OFF: each feature and each way to go wrong, on small files.
+#include "mesh_files.h"
+
+#include <algorithm>
+
+#include "import/polygons.h"
+
+namespace {
+
+using lsp::Exit;
+using lsp::Mesh;
+using namespace lsp_test;
+
+class Obj : public MeshFiles {};
+class Ply : public MeshFiles {};
+class Stl : public MeshFiles {};
+class Off : public MeshFiles {};
+class AnyFormat : public MeshFiles {};
+
+const std::string kSquare = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+
+TEST_F(Obj, QuadsBecomeTwoTrianglesInOrder) {
+  const Mesh mesh = import("a.obj", kSquare + "f 1 2 3 4\nf 1 2 3\n");
+  ASSERT_EQ(mesh.primitive_count, 3u);
+  EXPECT_EQ(mesh.primitives, (std::vector<uint32_t>{0, 1, 2}));
+  EXPECT_EQ(corner(mesh, 1, 0), glm::vec3(0, 0, 0));
+  EXPECT_EQ(corner(mesh, 1, 1), glm::vec3(1, 1, 0));
+  EXPECT_EQ(corner(mesh, 1, 2), glm::vec3(0, 1, 0));
+  EXPECT_EQ(mesh.positions.size(), 4u);
+}
+
+TEST_F(Obj, NegativeIndicesCountFromTheEndAtThatLine) {
+  const Mesh mesh = import("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\nv 5 5 5\n");
+  ASSERT_EQ(mesh.triangles.size(), 1u);
+  EXPECT_EQ(corner(mesh, 0, 2), glm::vec3(0, 1, 0));
+}
+
+TEST_F(Obj, LineEndsTabsContinuationsAndEncodings) {
+  const std::string text = kSquare + "f\t1 2 \\\n 3 4\n";
+  std::string bare_cr = text, crlf, utf16 = "\xFF\xFE";
+  std::replace(bare_cr.begin(), bare_cr.end(), '\n', '\r');
+  for (const char c : text) crlf += c == '\n' ? "\r\n" : std::string(1, c);
+  for (const char c : text) utf16 += {c, '\0'};
+  std::string utf16be_unmarked;
+  for (const char c : text) utf16be_unmarked += {'\0', c};
+  for (const std::string& form : {text, bare_cr, crlf, utf16, utf16be_unmarked, "\xEF\xBB\xBF" + text}) {
+    const Mesh mesh = import("a.obj", form);
+    EXPECT_EQ(mesh.triangles.size(), 2u);
+    EXPECT_FLOAT_EQ(float(area(mesh)), 1.0f);
+  }
+}
+
+TEST_F(Obj, RejectsByNamedReasonAndNothingElse) {
+  const Mesh mesh =
+      import("a.obj", kSquare +
+                          "v nan 0 0\nv 1e400 0 0\nv 2 0 0\nv 3.1+e2 0 0\n"
+                          "f 1 2 3\n"           // good
+                          "f 1 1 2\nf 1 2 7\n"  // two equal corners; a line
+                          "f 1 2 5\nf 1 2 6\nf 1 2 8\n"
+                          "f 0 1 2\nf 1 2 99\nf 1 2 -99\nf 1 2 x\nf 1 2 99999999999999999999\n");
+  EXPECT_EQ(mesh.primitive_count, 11u);
+  EXPECT_EQ(mesh.triangles.size(), 1u);
+  EXPECT_EQ(mesh.rejected.degenerate, 2u);
+  EXPECT_EQ(mesh.rejected.non_finite, 3u);
+  EXPECT_EQ(mesh.rejected.out_of_range, 5u);
+}
+
+TEST_F(Obj, RejectedTrianglesKeepTheirNumbers) {
+  const Mesh mesh = import("a.obj", kSquare + "f 1 1 1\nf 1 2 3\nf 9 9 9\nf 1 3 4\n");
+  EXPECT_EQ(mesh.primitives, (std::vector<uint32_t>{1, 3}));
+}
+
+TEST_F(Obj, FacesWithTooFewCornersAndLinesHoldNoTriangle) {
+  const Mesh mesh = import("a.obj", kSquare + "f 1 2\nf 1\nf\nl 1 2 3\np 1\nf 1 2 3\n");
+  EXPECT_EQ(mesh.primitive_count, 1u);
+  EXPECT_TRUE(has_note(mesh, "3 faces with fewer than three corners"));
+  EXPECT_TRUE(has_note(mesh, "2 lines, points"));
+}
+
+TEST_F(Obj, EdgesOfManyFacesAndDuplicatesSurvive) {
+  std::string text = "v 0 0 0\nv 1 0 0\n";
+  for (int i = 0; i < 7; ++i) text += "v 0.5 " + std::to_string(i + 1) + " " + std::to_string(i * i) + "\n";
+  for (int i = 0; i < 7; ++i) text += "f 1 2 " + std::to_string(i + 3) + "\n";
+  text += "f 1 2 3\nf 2 1 3\n";
+  EXPECT_EQ(import("a.obj", text).triangles.size(), 9u);
+}
+
+TEST_F(Obj, CornersHaveTheirOwnNormals) {
+  const Mesh mesh = import("a.obj", kSquare +
+                                        "vn 0 0 2\nvn 1 0 0\nvn 0 0 0\nvn nan 0 1\n"
+                                        "f 1//1 2//2 3//1\nf 1//2 3/7/1 4//-4\nf 1//3 2//4 3//9\n");
+  ASSERT_EQ(mesh.triangles.size(), 3u);
+  EXPECT_EQ(mesh.normals[0][0], glm::vec3(0, 0, 1));
+  EXPECT_EQ(mesh.normals[0][1], glm::vec3(1, 0, 0));
+  EXPECT_EQ(mesh.normals[1][0], glm::vec3(1, 0, 0)) << "the same vertex with another normal";
+  EXPECT_EQ(mesh.normals[1][2], glm::vec3(0, 0, 1));
+  for (const glm::vec3& normal : mesh.normals[2])
+    EXPECT_EQ(normal, glm::vec3(0, 0, 1)) << "geometric in their place";
+  EXPECT_TRUE(has_note(mesh, "2 corner normals"));
+}
+
+TEST_F(Obj, MaterialsWithSpacesEmissionAndWindowsPaths) {
+  write("my stuff.mtl",
+        "newmtl  a red \nKd 1 0 0\n newmtl lamp\nKe 3 4 5\nd 0.5\nPr 0.25\nnewmtl lamp\nKd 0 0 0\n");
+  const Mesh mesh = import("a.obj", "mtllib C:\\models\\my stuff.mtl\n" + kSquare +
+                                        "f 1 2 3\nusemtl a red\nf 1 3 4\nusemtl lamp\n"
+                                        "f 1 2 4\nusemtl nowhere\nf 2 3 4\n");
+  ASSERT_EQ(mesh.materials.size(), 4u);
+  const auto material = [&](size_t t) { return mesh.materials[mesh.material_ids[t]]; };
+  EXPECT_EQ(material(0).name, "");
+  EXPECT_EQ(material(1).name, "a red");
+  EXPECT_EQ(material(1).base_color, glm::vec3(1, 0, 0));
+  EXPECT_EQ(material(2).emission, glm::vec3(3, 4, 5));
+  EXPECT_EQ(material(2).base_color, glm::vec3(0.8f)) << "the first definition counts";
+  EXPECT_FLOAT_EQ(material(2).opacity, 0.5f);
+  EXPECT_FLOAT_EQ(material(2).roughness, 0.25f);
+  EXPECT_EQ(material(3).name, "nowhere");
+  EXPECT_TRUE(has_note(mesh, "named but not defined"));
+}
+
+TEST_F(Obj, AMissingLibraryIsANote) {
+  EXPECT_TRUE(
+      has_note(import("a.obj", "mtllib none.mtl\n" + kSquare + "f 1 2 3\n"), "none.mtl is not there"));
+}
+
+TEST_F(Obj, ConcavePolygonsAreCutInsideTheirOutline) {
+  // An arrow head whose fan from the first corner would lie partly outside.
+  const Mesh mesh = import("a.obj", "v 0 0 0\nv 4 4 0\nv 0 1 0\nv -4 4 0\nf 2 3 4 1\nf 1 2 3 4\nf 4 3 2 1\n");
+  ASSERT_EQ(mesh.triangles.size(), 6u);
+  EXPECT_NEAR(area(mesh), 3 * 4.0, 1e-6);
+  for (size_t t = 0; t < 4; ++t) EXPECT_GT(face_normal(mesh, t).z, 0.99f);
+  for (size_t t = 4; t < 6; ++t) EXPECT_LT(face_normal(mesh, t).z, -0.99f);
+}
+
+TEST(Triangulate, CombsInEveryPlaneKeepTheirArea) {
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<glm::vec3> comb;
+    const auto add = [&](float u, float v) {
+      glm::vec3 p(0.25f);
+      p[(axis + 1) % 3] = u;
+      p[(axis + 2) % 3] = v;
+      comb.push_back(p);
+    };
+    const int teeth = 20;
+    add(0, 0);
+    add(teeth, 0);
+    for (int i = teeth; i-- > 0;) {
+      add(float(i) + 1.0f, 5);
+      add(float(i) + 0.5f, 1);
+    }
+    std::vector<glm::uvec3> cut;
+    uint64_t work = 1'000'000;
+    lsp::triangulate(comb, cut, work);
+    EXPECT_EQ(cut.size(), comb.size() - 2);
+    double sum = 0;
+    for (const glm::uvec3& t : cut) {
+      sum += 0.5 * double(glm::cross(comb[t.y] - comb[t.x], comb[t.z] - comb[t.x])[axis]);
+    }
+    double outline = 0;  // the shoelace formula
+    for (size_t i = 0; i < comb.size(); ++i) {
+      const glm::vec3 a = comb[i], b = comb[(i + 1) % comb.size()];
+      outline += 0.5 * double(glm::cross(a, b)[axis]);
+    }
+    EXPECT_NEAR(sum, outline, 1e-3);
+    double absolute = 0;
+    for (const glm::uvec3& t : cut) {
+      absolute += 0.5 * double(glm::length(glm::cross(comb[t.y] - comb[t.x], comb[t.z] - comb[t.x])));
+    }
+    EXPECT_NEAR(absolute, std::abs(outline), 1e-3) << "no triangle lies outside or twice";
+  }
+}
+
+TEST(Triangulate, AlwaysGivesCornersMinusTwoAndEnds) {
+  uint32_t seed = 1;
+  const auto random = [&] { return float((seed = seed * 1664525u + 1013904223u) >> 8) * 0x1p-24f; };
+  for (size_t n = 3; n < 200; ++n) {
+    std::vector<glm::vec3> tangle(n);
+    for (glm::vec3& p : tangle)
+      p = {std::floor(random() * 4), std::floor(random() * 4), n % 3 ? 0.0f : random()};
+    std::vector<glm::uvec3> cut;
+    uint64_t work = n % 5 ? 1'000'000 : 500;
+    lsp::triangulate(tangle, cut, work);
+    ASSERT_EQ(cut.size(), n - 2);
+    for (const glm::uvec3& t : cut) ASSERT_TRUE(t.x < n && t.y < n && t.z < n);
+  }
+}
+
+// A cube's faces meet at 90 degrees, a fine sphere's at far less.
+TEST_F(AnyFormat, SmoothNormalsStopAtCreases) {
+  const std::string cube =
+      "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n"
+      "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+  const Mesh flat = import("cube.obj", cube);
+  for (size_t t = 0; t < flat.triangles.size(); ++t) {
+    for (const glm::vec3& normal : flat.normals[t])
+      EXPECT_GT(glm::dot(normal, face_normal(flat, t)), 0.9999f);
+  }
+  const Mesh smooth = import("cube.obj", cube, {.crease_angle_degrees = 120});
+  for (size_t t = 0; t < smooth.triangles.size(); ++t) {
+    for (int i = 0; i < 3; ++i) {
+      const glm::vec3 outward = glm::normalize(corner(smooth, t, i) - glm::vec3(0.5f));
+      EXPECT_GT(glm::dot(smooth.normals[t][i], outward), 0.9999f)
+          << "angle weights make a cube's corner normal its diagonal however its faces are cut";
+    }
+  }
+}
+
+TEST_F(AnyFormat, EqualPositionsAreWeldedExactly) {
+  const Mesh mesh = import(
+      "a.obj",
+      "v 0 0 0\nv 1 0 0\nv 0 1 0\nv -0 0 -0\nv 0 1 0\nv -1 0 0\nv 1e-45 0 0\nf 1 2 3\nf 4 5 6\nf 7 2 3\n");
+  EXPECT_EQ(mesh.positions.size(), 5u) << "0, x, y, -x and the smallest number that is not 0";
+  EXPECT_EQ(mesh.triangles[0].x, mesh.triangles[1].x);
+  EXPECT_FALSE(std::signbit(mesh.positions[mesh.triangles[1].x].x));
+}
+
+TEST_F(AnyFormat, InputsAreNumberedInTheOrderGiven) {
+  const std::filesystem::path paths[] = {write("b.obj", kSquare + "f 1 2 3\nf 1 1 1\n"),
+                                         write("a.off", "OFF 3 1 0\n0 0 5\n1 0 5\n0 1 5\n3 0 1 2\n")};
+  const Mesh mesh = lsp::import_meshes(paths, {});
+  EXPECT_EQ(mesh.primitive_count, 3u);
+  EXPECT_EQ(mesh.primitives, (std::vector<uint32_t>{0, 2}));
+  EXPECT_EQ(corner(mesh, 1, 0).z, 5.0f);
+}
+
+TEST_F(AnyFormat, RefusalsHaveTheirExitCodes) {
+  EXPECT_EQ(refusal("a.obj", "").exit, Exit::kInvalid);
+  EXPECT_EQ(refusal("a.obj", kSquare).exit, Exit::kInvalid);
+  EXPECT_EQ(refusal("a.obj", kSquare + "f 1 1 1\n").exit, Exit::kInvalid);
+  EXPECT_EQ(refusal("a.fbx", "x").exit, Exit::kUnsupported);
+  const std::filesystem::path missing = folder_ / "none.ply", pipe = folder_ / "pipe.obj";
+  std::filesystem::create_directory(folder_ / "folder.stl");
+  const std::filesystem::path folder = folder_ / "folder.stl";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  for (const auto& path : {missing, folder, pipe}) {
+    try {
+      lsp::import_meshes({&path, 1}, {});
+      ADD_FAILURE() << path;
+    } catch (const lsp::Failure& failure) {
+      EXPECT_EQ(failure.exit(), Exit::kFile);
+      EXPECT_EQ(failure.file(), path.string());
+    }
+  }
+}
+
+TEST_F(AnyFormat, TheMemoryLimitHolds) {
+  std::string text = kSquare;
+  for (int i = 0; i < 20000; ++i) text += "f 1 2 3\n";
+  EXPECT_EQ(refusal("a.obj", text, {.memory_limit = 1 << 20}).exit, Exit::kLimit);
+  EXPECT_EQ(refusal("a.obj", text, {.memory_limit = 64 << 20}).exit, Exit::kDone);
+}
+
+// The same mesh in each of PLY's three encodings, with properties before, between and behind the used ones.
+std::string ply(const std::string& format, const std::string& body) {
+  return "ply\nformat " + format +
+         " 1.0\ncomment x\nelement vertex 4\nproperty uchar red\nproperty double x\nproperty float y\n"
+         "property short z\nproperty list uchar float weights\nelement other 1\nproperty int k\n"
+         "element face 2\nproperty uchar flag\nproperty list uchar int vertex_indices\nproperty float "
+         "quality\nend_header\n" +
+         body;
+}
+
+template <typename T>
+void append_ordered(std::string& out, T value, bool big) {
+  std::string raw;
+  append(raw, value);
+  if (big) std::reverse(raw.begin(), raw.end());
+  out += raw;
+}
+
+std::string binary_ply(bool big) {
+  std::string body;
+  for (const glm::ivec3 p :
+       {glm::ivec3(0, 0, 3), glm::ivec3(1, 0, 3), glm::ivec3(1, 1, 3), glm::ivec3(0, 1, 3)}) {
+    append_ordered(body, uint8_t{9}, big);
+    append_ordered(body, double(p.x), big);
+    append_ordered(body, float(p.y), big);
+    append_ordered(body, int16_t(p.z), big);
+    append_ordered(body, uint8_t{2}, big);
+    append_ordered(body, 0.5f, big);
+    append_ordered(body, 0.5f, big);
+  }
+  append_ordered(body, int32_t{7}, big);
+  for (const std::vector<int>& face : {std::vector<int>{0, 1, 2, 3}, {0, 1, 2}}) {
+    append_ordered(body, uint8_t{1}, big);
+    append_ordered(body, uint8_t(face.size()), big);
+    for (const int index : face) append_ordered(body, int32_t(index), big);
+    append_ordered(body, 0.25f, big);
+  }
+  return ply(big ? "binary_big_endian" : "binary_little_endian", body);
+}
+
+TEST_F(Ply, AllEncodingsGiveTheSameMesh) {
+  const std::string ascii =
+      ply("ascii",
+          "9 0 0 3 2 .5 .5\n9 1 0 3 2 .5 .5\n\n9 1 1\n 3 2 .5 .5\n9 0 1 3 2 .5 .5 undeclared values\n7\n"
+          "1 4 0 1 2 3 .25\n1 3 0 1 2 .25\n");
+  std::string bare_cr = ascii;
+  std::replace(bare_cr.begin(), bare_cr.end(), '\n', '\r');
+  for (const std::string& file : {ascii, bare_cr, binary_ply(false), binary_ply(true)}) {
+    const Mesh mesh = import("a.ply", file);
+    ASSERT_EQ(mesh.triangles.size(), 3u);
+    EXPECT_EQ(mesh.positions.size(), 4u);
+    EXPECT_NEAR(area(mesh), 1.5, 1e-6);
+    EXPECT_EQ(corner(mesh, 0, 2), glm::vec3(1, 1, 3));
+    EXPECT_TRUE(has_note(mesh, "colours"));
+  }
+}
+
+TEST_F(Ply, NormalsAndStrips) {
+  const Mesh mesh =
+      import("a.ply",
+             "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\n"
+             "property float nx\nproperty float ny\nproperty float nz\nelement tristrips 1\n"
+             "property list int int vertex_indices\nend_header\n"
+             "0 0 0 0 0 2\n1 0 0 0 0 2\n0 1 0 0 0 2\n1 1 0 0 0 2\n2 2 0 0 3 0\n8 0 1 2 3 -1 1 4 3\n");
+  ASSERT_EQ(mesh.triangles.size(), 3u);
+  for (size_t t = 0; t < 3; ++t) EXPECT_GT(face_normal(mesh, t).z, 0.99f);
+  EXPECT_EQ(mesh.normals[0][0], glm::vec3(0, 0, 1));
+  EXPECT_EQ(mesh.normals[2][1], glm::vec3(0, 1, 0));
+}
+
+TEST_F(Ply, HeadersThatPromiseTooMuchAreRefusedAtOnce) {
+  const std::string start = "ply\nformat binary_little_endian 1.0\nelement vertex ";
+  const std::string xyz = "\nproperty float x\nproperty float y\nproperty float z\n";
+  EXPECT_EQ(refusal("a.ply", start + "4000000000" + xyz + "end_header\n" + std::string(100, 'x')).exit,
+            Exit::kInvalid);
+  EXPECT_EQ(refusal("a.ply", start + "18446744073709551615" + xyz + "end_header\n").exit, Exit::kInvalid);
+  EXPECT_EQ(refusal("a.ply", start + "-1" + xyz + "end_header\n").exit, Exit::kInvalid);
+  EXPECT_EQ(refusal("a.ply", start + "1" + xyz +
+                                 "element face 1\nproperty list uint int vertex_indices\nend_header\n" +
+                                 std::string(12, '\0') + "\xFF\xFF\xFF\xFF" + std::string(50, '\0'))
+                .exit,
+            Exit::kInvalid);
+  EXPECT_EQ(refusal("a.ply", "ply\nformat ascii 1.0\nelement nothing 9000000000000000000\nend_header\n").exit,
+            Exit::kInvalid);
+  EXPECT_EQ(
+      refusal("a.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n").exit,
+      Exit::kInvalid);
+  EXPECT_EQ(refusal("a.ply", "ply\nformat ascii 1.0\nelement v 1\nproperty color x\nend_header\n1\n").exit,
+            Exit::kInvalid);
+  EXPECT_EQ(refusal("a.ply", "ply\nformat utf9 1.0\n").exit, Exit::kUnsupported);
+}
+
+std::string binary_stl(const std::string& header, uint32_t declared, int triangles) {
+  std::string out = header;
+  out.resize(80, ' ');
+  append(out, declared);
+  for (int i = 0; i < triangles; ++i) {
+    const float values[12] = {0, 0, 2, 0, 0, float(i), 1, 0, float(i), 0, 1, float(i)};
+    append(out, values);
+    append(out, uint16_t{0});
+  }
+  return out;
+}
+
+TEST_F(Stl, BinaryEvenWhereItsHeaderSaysSolid) {
+  const Mesh mesh = import("a.STL", binary_stl("solid exported", 3, 3));
+  ASSERT_EQ(mesh.triangles.size(), 3u);
+  EXPECT_EQ(corner(mesh, 2, 1), glm::vec3(1, 0, 2));
+  EXPECT_EQ(mesh.normals[0][0], glm::vec3(0, 0, 1));
+  EXPECT_TRUE(has_note(import("b.stl", binary_stl("", 2, 3)), "after the last triangle"));
+  EXPECT_EQ(refusal("c.stl", binary_stl("", 4, 3)).exit, Exit::kInvalid);
+  EXPECT_EQ(refusal("c.stl", binary_stl("", 0xFFFFFFFF, 3)).exit, Exit::kInvalid);
+  EXPECT_EQ(refusal("c.stl", "short").exit, Exit::kInvalid);
+}
+
+TEST_F(Stl, TextWithSeveralSolidsInAnyCase) {
+  const std::string facet =
+      " facet normal 0 0 1\n  outer loop\n   vertex 0 0 0\n   VERTEX 1 0 0\n   vertex 0 1 0\n  endloop\n "
+      "endfacet\n";
+  const Mesh mesh = import("a.stl", "\n SOLID vertex facet\n" + facet +
+                                        "endsolid\nsolid empty\nendsolid\nsolid b\n" + facet +
+                                        " facet normal 0 0 0\n outer loop\n vertex 0 0 0\n vertex 0 0 0\n "
+                                        "vertex 0 1 0\n endloop\n endfacet\nendsolid\n");
+  EXPECT_EQ(mesh.primitive_count, 3u);
+  EXPECT_EQ(mesh.rejected.degenerate, 1u);
+  EXPECT_EQ(mesh.positions.size(), 3u);
+  EXPECT_EQ(refusal("b.stl", "solid a\n" + facet.substr(0, facet.size() - 11)).exit, Exit::kInvalid);
+}
+
+TEST_F(Off, CommentsColoursBrokenLinesAndKeywords) {
+  const std::string body =
+      "# eight\n0 0 0 # here\n\n1 0 0 255 0 0\n1 1 0\n0 1 0\n4 0 1\n 2 3\n3 0 1 2 .5 0 0 1\n3 0\n1\n3\n";
+  for (const std::string start :
+       {"OFF\n4 3 0\n", "OFF 4 3 0\n", "# a\nOFF4 3 0 # x\n", "4 3\n", "COFF\n4\n3 0\n"}) {
+    const Mesh mesh = import("a.off", start + body);
+    EXPECT_EQ(mesh.triangles.size(), 4u) << start;
+    EXPECT_NEAR(area(mesh), 2.0, 1e-6);
+    EXPECT_TRUE(has_note(mesh, "colours"));
+  }
+  const Mesh with_normals = import("a.off", "NOFF\n3 1 0\n0 0 0 0 0 1\n1 0 0 0 1 0\n0 1 0 0 0 1\n3 0 1 2\n");
+  EXPECT_EQ(with_normals.normals[0][1], glm::vec3(0, 1, 0));
+}
+
+TEST_F(Off, Refusals) {
+  EXPECT_EQ(refusal("a.off", "OFF BINARY\n1 2 3\n").exit, Exit::kUnsupported);
+  EXPECT_EQ(refusal("a.off", "nOFF\n4\n").exit, Exit::kUnsupported);
+  EXPECT_EQ(refusal("a.off", "OFF\n2000000000 1 0\n0 0 0\n").exit, Exit::kInvalid);
+  EXPECT_EQ(refusal("a.off", "OFF\n1 1 0\n0 0 0\n2000000000 0 0 0\n").exit, Exit::kInvalid);
+  EXPECT_EQ(refusal("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n").exit, Exit::kInvalid);
+  EXPECT_EQ(refusal("a.off", "solid\n").exit, Exit::kInvalid);
+}
+
+// No prefix of a file and no changed byte may do more than be refused.
+TEST_F(AnyFormat, DamagedFilesAreReadOrRefused) {
+  const std::pair<std::string, std::string> files[] = {
+      {"a.obj", "mtllib a.mtl\n" + kSquare + "vn 0 0 1\nusemtl x\nf 1/1/1 2//1 3 -1\n"},
+      {"b.ply", binary_ply(false)},
+      {"c.ply",
+       ply("ascii", "9 0 0 3 1 1\n9 1 0 3 0\n9 1 1 3 0\n9 0 1 3 0\n7\n1 4 0 1 2 3 .25\n1 3 0 1 2 .25\n")},
+      {"d.stl", binary_stl("", 2, 2)},
+      {"e.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"}};
+  uint32_t seed = 7;
+  const auto random = [&](size_t below) { return (seed = seed * 1664525u + 1013904223u) % uint32_t(below); };
+  const lsp::ImportOptions options{.memory_limit = 64 << 20};
+  size_t read = 0, refused = 0;
+  for (const auto& [name, bytes] : files) {
+    for (size_t length = 0; length < bytes.size(); ++length) {
+      const Exit exit = refusal(name, bytes.substr(0, length), options).exit;
+      ++(exit == Exit::kDone ? read : refused);
+    }
+    for (int i = 0; i < 400; ++i) {
+      std::string damaged = bytes;
+      for (size_t k = 0; k <= random(4); ++k) damaged[random(damaged.size())] = char(random(256));
+      const Exit exit = refusal(name, damaged, options).exit;
+      ++(exit == Exit::kDone ? read : refused);
+      EXPECT_NE(exit, Exit::kInternal);
+    }
+  }
+  EXPECT_GT(read, 100u);
+  EXPECT_GT(refused, 100u);
+}
+
+}  // namespace
