@@ -159,7 +159,7 @@ glm::vec3 Sky::radiance(glm::vec3 direction) const {
   const glm::vec3 horizon(0.86f, 0.92f, 1.0f);
   const glm::vec3 ground(0.24f, 0.22f, 0.20f);
   const float haze = std::pow(1.0f - std::max(up, 0.0f), 3.0f);
-  const glm::vec3 clear = glm::mix(zenith, horizon, haze) * 1.5f;
+  const glm::vec3 clear = glm::mix(zenith, horizon, haze) * 2.2f;
   // A soft glow about the sun.
   const float toward = std::max(glm::dot(direction, sun_direction), 0.0f);
   const glm::vec3 glow = glm::vec3(1.0f, 0.85f, 0.6f) * (0.9f * std::pow(toward, 24.0f));

@@ -75,7 +75,7 @@ class RenderScene {
 // The light from outside: a clear sky with a sun in it. y is up.
 struct Sky {
   glm::vec3 sun_direction = glm::normalize(glm::vec3(-0.28f, 0.80f, 0.53f));
-  glm::vec3 sun_irradiance = glm::vec3(1.0f, 0.86f, 0.68f) * 11.0f;
+  glm::vec3 sun_irradiance = glm::vec3(1.0f, 0.87f, 0.70f) * 9.0f;
   float sun_radius_rad = 0.012f;
   float brightness = 1.0f;
   // Radiance of the sky without the sun's disc.

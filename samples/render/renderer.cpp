@@ -367,20 +367,56 @@ class Renderer {
       ray[1] = ray_from(p, toward_sun, kInfinity);
     }
 
-    if (!scene_.has_emitters()) return;
-    const EmitterPoint emitter =
-        scene_.sample_emitter(random(item, dimension + 2).x, random(item, dimension + 2 + 0x20000u));
+    if (scene_.has_emitters()) make_emitter_ray(slot[2], ray[2], p, weight, dimension + 2);
+  }
+
+  // A ray to one of a few candidate points on emitters, chosen by the light it would bring if nothing were in
+  // the way (resampled importance sampling, Talbot et al. 2005): of many lamps most are far.
+  void make_emitter_ray(LightRay& slot, LspRay& ray, const SurfacePoint& p, glm::vec3 weight,
+                        uint32_t dimension) const {
+    constexpr uint32_t kCandidates = 8;
     const glm::vec3 origin = p.position + offset_ * p.geometric_normal;
-    const glm::vec3 way = emitter.position - origin;
-    const float distance2 = glm::dot(way, way);
-    if (!(distance2 > 0) || !(emitter.pdf > 0)) return;
-    const glm::vec3 direction = way / std::sqrt(distance2);
-    const float here = glm::dot(direction, p.shading_normal);
-    const float there = std::abs(glm::dot(direction, emitter.normal));
-    if (here <= 0 || there <= 0 || glm::dot(direction, p.geometric_normal) <= 0) return;
-    slot[2].radiance = weight * emitter.radiance * (here * there / (distance2 * emitter.pdf * kPi));
-    // Ends just short of the emitter; t counts in lengths of `way`.
-    ray[2] = {from_glm(origin), 0.0f, from_glm(way), 0.999f};
+    float total = 0.0f;
+    glm::vec3 chosen_way(0.0f);
+    glm::vec3 chosen_light(0.0f);
+    float chosen_value = 0.0f;
+    float pick = random(slot.item, dimension).x;
+    uint32_t state = hash_combine(hash_combine(order_[first_ + slot.item], sample_), dimension);
+    const auto next = [&state] {
+      state = hash_mix(state + 0x9E3779B9u);
+      return static_cast<float>(state >> 8) * (1.0f / 16777216.0f);
+    };
+    for (uint32_t i = 0; i < kCandidates; ++i) {
+      const float chance = next();
+      const float x = next();
+      const EmitterPoint emitter = scene_.sample_emitter(chance, {x, next()});
+      const glm::vec3 way = emitter.position - origin;
+      const float distance2 = glm::dot(way, way);
+      if (!(distance2 > 0) || !(emitter.pdf > 0)) continue;
+      const glm::vec3 direction = way / std::sqrt(distance2);
+      const float here = glm::dot(direction, p.shading_normal);
+      const float there = std::abs(glm::dot(direction, emitter.normal));
+      if (here <= 0 || glm::dot(direction, p.geometric_normal) <= 0) continue;
+      const glm::vec3 light = emitter.radiance * (here * there / (distance2 * kPi));
+      const float value = std::max({light.x, light.y, light.z});
+      const float share = value / emitter.pdf;
+      if (!(share > 0) || !std::isfinite(share)) continue;
+      total += share;
+      // One random number serves all choices: what is left of it after a choice is uniform again.
+      const float keep = share / total;
+      if (pick < keep) {
+        pick /= keep;
+        chosen_way = way;
+        chosen_light = light;
+        chosen_value = value;
+      } else {
+        pick = (pick - keep) / (1.0f - keep);
+      }
+    }
+    if (!(chosen_value > 0)) return;
+    slot.radiance = weight * chosen_light * (total / (static_cast<float>(kCandidates) * chosen_value));
+    // Ends just short of the emitter; t counts in lengths of the way.
+    ray = {from_glm(origin), 0.0f, from_glm(chosen_way), 0.999f};
   }
 
   void trace_light(uint32_t flags, bool indirect) {
