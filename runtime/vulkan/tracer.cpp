@@ -289,7 +289,6 @@ bool VulkanTracer::Impl::try_import(bool forced) {
     close();
     open();
   } catch (const Failure& failure) {
-    // A section that does not fit, or is not there, fails by upload too: let that say so.
     load_note = failure.what();
     unload();
   }
@@ -303,6 +302,11 @@ void VulkanTracer::Impl::load(const lsp_scene& scene, uint32_t uses, LoadPath pa
   scene_ = scene;
   uses_ = uses;
   load_note.clear();
+  // What no way of loading can mend is said before the first is tried.
+  lsp_vulkan_plan plan;
+  lsp_error error;
+  const lsp_status status = lsp_vulkan_plan_buffers(&scene_, uses_, &device->limits, &plan, &error);
+  if (status != LSP_OK) throw Failure(static_cast<Exit>(status), "", error.message);
   if (path != LoadPath::kUpload && try_import(path == LoadPath::kImport)) {
     load_path = LoadPath::kImport;
   } else {

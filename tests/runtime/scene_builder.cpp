@@ -311,16 +311,17 @@ Parts build_parts(const BuildOptions& options) {
   return parts;
 }
 
-Parts build_stack_of_sheets(uint32_t triangles) {
+Parts build_stack_of_sheets(uint32_t triangles, uint32_t leaf_triangles) {
   BuildOptions options;
   options.line_spaces = options.normals = options.materials = false;
-  options.leaf_triangles = 1;
+  options.leaf_triangles = leaf_triangles;
   Random random(7);
   Parts parts;
   for (uint32_t i = 0; i < triangles; ++i) {
     // The axis passes through the triangle's box, close by its hypotenuse.
     const float x = static_cast<float>(i);
-    parts.triangles.push_back({{x, -1, -0.9f}, i, {x, 0.9f, 1}, 0, {x, -1, 1}, 0});
+    const float shift = i + 1 == triangles ? -0.5f : 0.0f;
+    parts.triangles.push_back({{x, -1, -0.9f + shift}, i, {x, 0.9f, 1 + shift}, 0, {x, -1, 1 + shift}, 0});
   }
   build_tree(parts, options, random);
   return parts;

@@ -56,9 +56,9 @@ struct BuildOptions {
 // have arbitrary bits and candidates: nothing one would bake, but every entry in range.
 Parts build_parts(const BuildOptions& options);
 
-// `triangles` triangles one behind the other along x. A ray along the axis passes every box and misses every
-// triangle: the longest traversal there can be.
-Parts build_stack_of_sheets(uint32_t triangles);
+// `triangles` triangles one behind the other along x, a unit apart. A ray along the axis passes every box and
+// misses every triangle but the last: the longest traversal there can be.
+Parts build_stack_of_sheets(uint32_t triangles, uint32_t leaf_triangles);
 
 // The file: sections in order at multiples of the header's alignment, hashes right.
 Bytes write_raw(const Parts& parts);

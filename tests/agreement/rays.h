@@ -1,0 +1,14 @@
+// Rays that are hard to answer alike: through corners and edges, along axes, in the planes of boxes, from
+// inside, with signed zeros, with lengths at the ends of the range, and invalid ones.
+#pragma once
+
+#include <vector>
+
+#include "scene_builder.h"
+
+namespace lsp::test {
+
+// `count` rays about the scene, every kind in turn.
+std::vector<LspRay> hard_rays(const Parts& parts, uint32_t count, uint64_t seed);
+
+}  // namespace lsp::test
