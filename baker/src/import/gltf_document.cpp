@@ -1,5 +1,7 @@
 #include "import/gltf_document.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 
 #include "import/source_file.h"
@@ -193,6 +195,34 @@ json reduce_document(const json& from) {
   return to;
 }
 
+bool is_integer_key(std::string_view key) {
+  constexpr std::string_view kKeys[] = {
+      "scene",      "nodes",  "children", "mesh",   "indices",     "material",     "mode",
+      "POSITION",   "NORMAL", "_INDICES", "buffer", "bufferView",  "byteOffset",   "byteLength",
+      "byteStride", "count",  "ROTATION", "SCALE",  "TRANSLATION", "componentType"};
+  return std::find(std::begin(kKeys), std::end(kKeys), key) != std::end(kKeys);
+}
+
+// JSON has one kind of number, and 36.0 is an index too; tinygltf would take it for missing, and the default
+// in its place. Whatever is not a whole number of 0 or more where one belongs is refused here by name.
+void make_integers(const std::string& file, std::string_view key, json& value) {
+  if (value.is_object()) {
+    for (auto& [name, item] : value.items()) make_integers(file, name, item);
+  } else if (value.is_array()) {
+    for (json& item : value) make_integers(file, key, item);
+  } else if (is_integer_key(key) &&
+             !(key == "mode" && value.is_string())) {  // EXT_meshopt_compression's is text
+    constexpr double kLargest = 9007199254740992.0;    // 2^53: beyond, doubles skip integers
+    if (value.is_number_float()) {
+      const auto number = value.get<double>();
+      if (number >= 0 && number <= kLargest && number == std::floor(number)) value = uint64_t(number);
+    }
+    if (!value.is_number_unsigned() || value.get<uint64_t>() > uint64_t(kLargest)) {
+      fail(file, "has a " + std::string(key) + " that is no index or size");
+    }
+  }
+}
+
 void check_version(const std::string& file, const json& document) {
   const json& version = member(member(document, "asset"), "version");
   const std::string text = version.is_string() ? version.get<std::string>() : "";
@@ -281,8 +311,9 @@ void read_buffers(const std::filesystem::path& path, const json& document, Bytes
   for (size_t i = 0; i < list.size(); ++i) {
     const json& length = member(list[i], "byteLength");
     const json& uri = member(list[i], "uri");
-    if (!length.is_number_unsigned()) fail(out.file, "has a buffer without a byteLength");
-    const auto bytes_wanted = length.get<uint64_t>();
+    const double declared = length.is_number() ? length.get<double>() : -1.0;
+    if (!(declared >= 0 && declared < 1e15)) fail(out.file, "has a buffer without a usable byteLength");
+    const auto bytes_wanted = uint64_t(declared);
     Bytes bytes;
     if (uri.is_string()) {
       const auto& text = uri.get_ref<const std::string&>();
@@ -333,7 +364,9 @@ std::unique_ptr<GltfDocument> read_gltf_document(const std::filesystem::path& pa
     check_version(out->file, document);
     check_extensions(out->file, document);
     read_buffers(path, document, container.binary, *out, budget);
-    reduced = reduce_document(document).dump(-1, ' ', false, json::error_handler_t::replace);
+    json geometry = reduce_document(document);
+    make_integers(out->file, "", geometry);
+    reduced = geometry.dump(-1, ' ', false, json::error_handler_t::replace);
   }
   if (reduced.size() > 0x7FFFFFFF) fail(out->file, "has more than 2 GiB of JSON");
 

@@ -1,7 +1,6 @@
 // A glTF asset as far as geometry goes: the JSON reduced to what is read, and the buffers beside it.
 #pragma once
 
-#include <tiny_gltf.h>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -10,6 +9,7 @@
 #include <vector>
 
 #include "import/budget.h"
+#include "import/tinygltf.h"
 
 namespace lsp {
 
