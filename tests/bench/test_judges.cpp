@@ -176,6 +176,12 @@ TEST(Verdict, TellsWhoIsRight) {
   const LspRay graze{{0.5f, 0.5f, 1}, 0, {0, 0, -1}, INFINITY};
   EXPECT_EQ(judge(soup, graze, kMiss, near), Verdict::kGraze);
   EXPECT_EQ(judge(soup, graze, far, near), Verdict::kGraze);
+  // Two planes a float step apart at that distance.
+  const Soup thin =
+      soup_from({{glm::vec3(0, 0, 1000), glm::vec3(1, 0, 1000), glm::vec3(0, 1, 1000)},
+                 {glm::vec3(0, 0, 999.99994f), glm::vec3(1, 0, 999.99994f), glm::vec3(0, 1, 999.99994f)}});
+  const LspRay close{{0.25f, 0.25f, 1001}, 0, {0, 0, -1}, INFINITY};
+  EXPECT_EQ(judge(thin, close, hit_of(1, 0), hit_of(1.00006f, 1)), Verdict::kUnresolved);
   // A graze excuses no one who misses what lies plainly there.
   Soup backed = soup;
   backed.corners[1] = {glm::vec3(-5, -5, -1), glm::vec3(9, -5, -1), glm::vec3(-5, 9, -1)};

@@ -56,9 +56,10 @@ IdealHit ideal_hit(const LspRay& ray, const std::array<glm::vec3, 3>& corners) {
   if (slope == 0) return hit;
   const Real t = dot(normal, p[0]) / slope;
   hit.t = static_cast<double>(t);
+  const Real along = std::abs(slope) / (length(normal) * length(d));
+  hit.t_resolution = hit.resolution / static_cast<double>(length(d) * along);
   hit.inside = hit.edge_distance >= 0 && t > Real{ray.tmin} && t < Real{ray.tmax};
   // Nearly in the plane: where along the ray it is met is ill-conditioned.
-  const Real along = std::abs(slope) / (length(normal) * length(d));
   if (along < Real{1e-6}) hit.resolution = INFINITY;
   return hit;
 }
@@ -85,44 +86,64 @@ std::optional<uint32_t> ideal_closest(const Soup& soup, const LspRay& ray, Ideal
 }
 
 Verdict judge(const Soup& soup, const LspRay& ray, const LspHit& ours, const LspHit& reference) {
+  if (ours.primitive == reference.primitive) return Verdict::kAgree;
   const bool we_hit = ours.primitive != LSP_NONE, it_hits = reference.primitive != LSP_NONE;
-  if (we_hit == it_hits) {
-    if (!we_hit || (ours.primitive == reference.primitive && same_t(ours.t, reference.t))) {
-      return Verdict::kAgree;
-    }
-    if (same_t(ours.t, reference.t)) return Verdict::kTie;
+  if (we_hit && it_hits && same_t(ours.t, reference.t)) return Verdict::kTie;
+  const auto triangle_of = [&](const LspHit& hit) -> const std::array<glm::vec3, 3>* {
+    if (hit.primitive >= soup.triangle_of.size() || soup.triangle_of[hit.primitive] == LSP_NONE)
+      return nullptr;
+    return &soup.corners[soup.triangle_of[hit.primitive]];
+  };
+  if (we_hit && it_hits && triangle_of(ours) && triangle_of(reference)) {
+    // Near the origin the rounding of t alone can exceed the tolerance: what the two triangles' own t are
+    // decides whether they coincide.
+    const IdealHit a = ideal_hit(ray, *triangle_of(ours)), b = ideal_hit(ray, *triangle_of(reference));
+    if (a.inside && b.inside && same_t(a.t, b.t)) return Verdict::kTie;
   }
-  // Right is the nearest triangle that the ray passes for certain, or one before it that it grazes: there no
-  // tracer in single precision can know.
+  // Right is the nearest triangle that the ray passes for certain, or one that it passes or grazes before it,
+  // or so little behind it that no tracer in single precision can know.
   IdealHit ideal;
   const std::optional<uint32_t> nearest = ideal_closest(soup, ray, &ideal);
+  bool grazed = false;
   const auto right = [&](const LspHit& hit) {
     if (hit.primitive == LSP_NONE) return !nearest;
-    if (nearest && same_t(hit.t, static_cast<float>(ideal.t))) return true;
-    if (hit.primitive >= soup.triangle_of.size() || soup.triangle_of[hit.primitive] == LSP_NONE) return false;
-    const IdealHit grazed = ideal_hit(ray, soup.corners[soup.triangle_of[hit.primitive]]);
-    return grazed.graze() && (!nearest || hit.t < ideal.t);
+    if (!triangle_of(hit)) return false;
+    if (nearest && triangle_of(hit) == &soup.corners[*nearest]) return true;
+    const IdealHit own = ideal_hit(ray, *triangle_of(hit));
+    grazed = grazed || own.graze();
+    return (own.inside || own.graze()) &&
+           (!nearest || own.t <= ideal.t + std::max(own.t_resolution, ideal.t_resolution));
   };
   const bool we_are = right(ours), it_is = right(reference);
-  if (we_are && it_is) return Verdict::kGraze;
+  if (we_are && it_is) return grazed || !nearest ? Verdict::kGraze : Verdict::kUnresolved;
   if (we_are) return Verdict::kReferenceWrong;
   return it_is ? Verdict::kOursWrong : Verdict::kBothWrong;
 }
 
 Agreement compare_exact(const Soup& soup, std::span<const LspRay> rays, std::span<const LspHit> ours,
                         std::span<const LspHit> reference) {
-  static constexpr const char* kNames[] = {"agree",           "tie",       "graze", "ours wrong",
-                                           "reference wrong", "both wrong"};
+  static constexpr const char* kNames[] = {
+      "agree", "tie", "unresolved", "graze", "ours wrong", "reference wrong", "both wrong"};
   Agreement sum;
   sum.rays = rays.size();
+  std::vector<float> our_depth, reference_depth;
   for (size_t i = 0; i < rays.size(); ++i) {
     const Verdict verdict = judge(soup, rays[i], ours[i], reference[i]);
     sum.agree += verdict == Verdict::kAgree;
     sum.ties += verdict == Verdict::kTie;
+    sum.unresolved += verdict == Verdict::kUnresolved;
     sum.grazes += verdict == Verdict::kGraze;
     sum.ours_wrong += verdict == Verdict::kOursWrong;
     sum.reference_wrong += verdict == Verdict::kReferenceWrong;
     sum.both_wrong += verdict == Verdict::kBothWrong;
+    if (verdict == Verdict::kAgree && ours[i].primitive != LSP_NONE) {
+      const IdealHit ideal = ideal_hit(rays[i], soup.corners[soup.triangle_of[ours[i].primitive]]);
+      if (ideal.t_resolution > 0 && std::isfinite(ideal.t_resolution)) {
+        our_depth.push_back(static_cast<float>(std::abs(double{ours[i].t} - ideal.t) / ideal.t_resolution));
+        reference_depth.push_back(
+            static_cast<float>(std::abs(double{reference[i].t} - ideal.t) / ideal.t_resolution));
+      }
+    }
     if (verdict == Verdict::kAgree || verdict == Verdict::kTie) continue;
     sum.hit_or_miss += (ours[i].primitive == LSP_NONE) != (reference[i].primitive == LSP_NONE);
     if (sum.examples.size() < 8) {
@@ -137,6 +158,8 @@ Agreement compare_exact(const Soup& soup, std::span<const LspRay> rays, std::spa
       sum.examples.push_back(text);
     }
   }
+  sum.our_depth = spread_of(our_depth);
+  sum.reference_depth = spread_of(reference_depth);
   return sum;
 }
 

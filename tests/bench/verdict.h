@@ -5,13 +5,15 @@
 #include <span>
 #include <string>
 
+#include "ray_errors.h"
 #include "soup.h"
 
 namespace lsp::bench {
 
 enum class Verdict {
   kAgree,           // both miss, or both hit the same primitive
-  kTie,             // both hit, at the same t within kTieTolerance: coincident or touching triangles
+  kTie,             // both hit, at the same t within kTieTolerance, reported or ideal: coincident triangles
+  kUnresolved,      // both hit, at depths closer to each other than single precision can tell
   kGraze,           // both are defensible: an edge is closer to the ray than single precision can tell
   kOursWrong,       // extended precision agrees with the reference only
   kReferenceWrong,  // extended precision agrees with us only
@@ -24,8 +26,9 @@ inline constexpr double kTieTolerance = 1e-5;  // relative, in t
 struct IdealHit {
   bool inside = false;       // the ray passes the triangle, edges included, at a t in (tmin, tmax)
   double t = 0;              // of the plane
+  double t_resolution = 0;   // what single precision can tell apart in t there
   double edge_distance = 0;  // from the ray's line to the nearest edge's line, scene units; negative outside
-  double resolution = 0;     // what single precision can tell apart there, scene units
+  double resolution = 0;     // what single precision can tell apart across the ray, scene units
   bool graze() const { return !(edge_distance > resolution || edge_distance < -resolution); }
 };
 IdealHit ideal_hit(const LspRay& ray, const std::array<glm::vec3, 3>& corners);
@@ -38,10 +41,15 @@ std::optional<uint32_t> ideal_closest(const Soup& soup, const LspRay& ray, Ideal
 Verdict judge(const Soup& soup, const LspRay& ray, const LspHit& ours, const LspHit& reference);
 
 struct Agreement {
-  uint64_t rays = 0, agree = 0, ties = 0, grazes = 0, ours_wrong = 0, reference_wrong = 0, both_wrong = 0;
+  uint64_t rays = 0, agree = 0, ties = 0, unresolved = 0, grazes = 0, ours_wrong = 0, reference_wrong = 0,
+           both_wrong = 0;
   uint64_t hit_or_miss = 0;           // of the differences beyond ties: one hits, the other does not
   std::vector<std::string> examples;  // the first few differences in words, for the test's output
-  uint64_t beyond_ties() const { return grazes + ours_wrong + reference_wrong + both_wrong; }
+  // How far the depths lie from the ideal ones where both name the same primitive, in t_resolution.
+  Spread our_depth, reference_depth;
+
+  // What differs in hit, miss or primitive at a t that is not the same within kTieTolerance.
+  uint64_t beyond_ties() const { return unresolved + grazes + ours_wrong + reference_wrong + both_wrong; }
 };
 
 // Judges all; ours[i] and reference[i] answer rays[i].

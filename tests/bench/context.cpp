@@ -1,0 +1,53 @@
+#include "context.h"
+
+#include <cstdio>
+
+namespace lsp::bench {
+
+double mega(size_t rays, const Timing& timing) {
+  return timing.median > 0 ? static_cast<double>(rays) / timing.median * 1e-6 : 0;
+}
+
+double Context::speed_up(const std::string& what, const Timing& a, const Timing& b) {
+  const double ratio = a.median > 0 ? b.median / a.median : 0;
+  if (ratio_is_meaningless(a, b)) {
+    char text[96];
+    std::snprintf(text, sizeof text, ": %.2fx cannot be told from 1x (spread %.0f %% and %.0f %%)", ratio,
+                  100 * a.spread, 100 * b.spread);
+    warnings.push_back(what + text);
+  } else if (a.spread > 0.15 || b.spread > 0.15) {
+    char text[96];
+    std::snprintf(text, sizeof text, ": %.2fx is uncertain (spread %.0f %% and %.0f %%)", ratio,
+                  100 * a.spread, 100 * b.spread);
+    warnings.push_back(what + text);
+  }
+  return ratio;
+}
+
+void add_errors(Json& row, const RayErrors& errors) {
+  const auto rays = static_cast<double>(errors.rays ? errors.rays : 1);
+  const auto hits = static_cast<double>(errors.both_hit ? errors.both_hit : 1);
+  row["wrong_percent"] = 100 * errors.wrong_share();
+  row["wrong_hits_percent"] = 100 * static_cast<double>(errors.wrong_hits) / rays;
+  row["wrong_misses_percent"] = 100 * static_cast<double>(errors.wrong_misses) / rays;
+  row["depth_mean_percent"] = 100 * errors.depth_diagonal.mean;
+  row["depth_p95_percent"] = 100 * errors.depth_diagonal.p95;
+  row["depth_p99_percent"] = 100 * errors.depth_diagonal.p99;
+  row["depth_distance_percent"] = 100 * errors.depth_distance.mean;
+  row["normal_degrees"] = errors.normal_degrees.mean;
+  row["wrong_primitive_percent"] = 100 * static_cast<double>(errors.wrong_primitive) / hits;
+}
+
+std::vector<Column> error_columns() {
+  return {{"wrong_percent", "wrong %", 3},
+          {"wrong_hits_percent", "wrong hits %", 3},
+          {"wrong_misses_percent", "wrong misses %", 3},
+          {"depth_mean_percent", "depth error, % of diagonal", 3},
+          {"depth_p95_percent", "95th", 3},
+          {"depth_p99_percent", "99th", 3},
+          {"depth_distance_percent", "% of distance", 2},
+          {"normal_degrees", "normal, degrees", 2},
+          {"wrong_primitive_percent", "other primitive %", 1}};
+}
+
+}  // namespace lsp::bench

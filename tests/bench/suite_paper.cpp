@@ -1,0 +1,239 @@
+// The paper's table: each base structure without Line Spaces and with them at two depths, per scene; what
+// the bake costs, how fast it traces, how wrong it is. Beyond the paper: the same on a CPU and on Vulkan, and
+// the error of what is fast.
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdio>
+
+#include "context.h"
+#include "lsp/program.h"
+#include "ray_errors.h"
+
+namespace lsp::bench {
+namespace {
+
+struct Structure {
+  std::string name;
+  Bake bake;
+};
+
+std::vector<Structure> structures(bool quick) {
+  std::vector<Structure> all = {{"BVH, LS (9)", line_space_bake(6, 9)}};
+  if (quick) return all;
+  all.push_back({"BVH, LS (12)", line_space_bake(6, 12)});
+  all.push_back({"NT (6, 3), LS (2)", {"NT6", {"--base", "ntree", "--resolution", "6", "--depth", "2"}}});
+  all.push_back({"NT (10, 3), LS (2)", {"NT10", {"--base", "ntree", "--resolution", "10", "--depth", "2"}}});
+  return all;
+}
+
+const std::vector<Mode> kModes = {{}, {.approximate = true}, {.approximate = true, .near_approximate = true}};
+
+// Every mode against exact on the same file, on one tracer.
+std::vector<Timing> race_modes(Context& context, Tracer& tracer, const RaySet& set) {
+  std::vector<LspHit> hits(set.rays.size());
+  std::vector<Contender> contenders;
+  for (const Mode& mode : kModes) {
+    contenders.push_back({mode.name(), [&, mode] { return tracer.trace(mode, set.rays, hits); }});
+  }
+  return race(contenders, 1, context.repeats());
+}
+
+class VulkanFile : public Tracer {
+ public:
+  VulkanFile(VulkanTracer& vulkan, const OpenFile& file) : vulkan_(vulkan) {
+    vulkan.load(file.scene(), LSP_USE_EXACT | LSP_USE_APPROXIMATE);
+  }
+  std::string name() const override { return "Vulkan"; }
+  // In the shader, where the device has timestamps: an engine's rays and hits stay on the device.
+  double trace(const Mode& mode, std::span<const LspRay> rays, std::span<LspHit> hits) override {
+    const VulkanTrace done = vulkan_.trace(mode.options(), rays, hits);
+    return done.gpu_seconds > 0 ? done.gpu_seconds : done.seconds;
+  }
+
+ private:
+  VulkanTracer& vulkan_;
+};
+
+void add_structure(Context& context, SceneUnderTest& scene, const Structure& structure, Table& table,
+                   Table& loads, const std::vector<RaySet>& sets) {
+  const Baked& baked = scene.bake(structure.bake);
+  if (!baked.available) {
+    Json row;
+    row["scene"] = scene.name();
+    row["structure"] = structure.name + ": not available, " + baked.reason;
+    table.rows.push_back(row);
+    return;
+  }
+  const OpenFile file(baked.path);
+  const RaySet& surface = scene.surface(context.accuracy_rays());
+  const auto one = cpu_tracer(file, 1), all = cpu_tracer(file, context.threads);
+  std::unique_ptr<Tracer> vulkan;
+  if (context.vulkan) {
+    try {
+      vulkan = std::make_unique<VulkanFile>(*context.vulkan, file);
+    } catch (const Failure& failure) {
+      context.warnings.push_back(scene.name() + ", " + structure.name +
+                                 ": no Vulkan figures: " + failure.what());
+    }
+  }
+  std::vector<std::vector<Timing>> times;
+  std::vector<std::vector<Timing>> vulkan_times;
+  for (const RaySet& set : sets) {
+    times.push_back(race_modes(context, *one, set));
+    times.push_back(race_modes(context, *all, set));
+    if (vulkan) vulkan_times.push_back(race_modes(context, *vulkan, set));
+  }
+  for (size_t m = 0; m < kModes.size(); ++m) {
+    if (kModes[m].approximate && !file.has_line_spaces()) continue;
+    Json row;
+    row["scene"] = scene.name();
+    row["triangles"] = scene.soup().size();
+    row["structure"] = structure.name;
+    row["mode"] = kModes[m].name();
+    row["bake_seconds"] = baked.seconds;
+    row["peak_mib"] = static_cast<double>(baked.peak_bytes) / (1 << 20);
+    row["file_mb"] = static_cast<double>(baked.file_bytes) * 1e-6;
+    const std::string what = scene.name() + ", " + structure.name + ", " + kModes[m].name();
+    const char* keys[] = {"ordered_1", "ordered_all", "shuffled_1", "shuffled_all"};
+    for (size_t k = 0; k < times.size() && k < 4; ++k) {
+      row[std::string(keys[k]) + "_mrays"] = mega(sets[k / 2].rays.size(), times[k][m]);
+      if (m > 0)
+        row[std::string(keys[k]) + "_times"] =
+            context.speed_up(what + ", " + keys[k], times[k][m], times[k][0]);
+    }
+    const char* vulkan_keys[] = {"vulkan_ordered", "vulkan_shuffled"};
+    for (size_t k = 0; k < vulkan_times.size() && k < 2; ++k) {
+      row[std::string(vulkan_keys[k]) + "_mrays"] = mega(sets[k].rays.size(), vulkan_times[k][m]);
+      if (m > 0) {
+        row[std::string(vulkan_keys[k]) + "_times"] =
+            context.speed_up(what + ", " + vulkan_keys[k], vulkan_times[k][m], vulkan_times[k][0]);
+      }
+    }
+    std::vector<LspHit> hits(surface.rays.size());
+    all->trace(kModes[m], surface.rays, hits);
+    add_errors(row, ray_errors(scene.soup(), surface.rays, surface.truth, hits));
+    const Work work = count_work(file, kModes[m],
+                                 std::span(surface.rays).first(std::min<size_t>(surface.rays.size(), 50000)));
+    row["nodes"] = work.nodes;
+    row["shafts"] = work.shafts;
+    row["triangle_tests"] = work.triangles;
+    table.rows.push_back(row);
+  }
+  (void)loads;
+}
+
+// Opens the file and traces 64 rays, cold (the page cache told to forget the file) or warm; in milliseconds.
+double first_ray_milliseconds(const std::filesystem::path& path, const Mode& mode,
+                              std::span<const LspRay> rays, bool cold) {
+  if (cold) {
+    const int descriptor = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+    if (descriptor >= 0) {
+      fdatasync(descriptor);  // dirty pages cannot be dropped
+      posix_fadvise(descriptor, 0, 0, POSIX_FADV_DONTNEED);
+      close(descriptor);
+    }
+  }
+  const double start = seconds_since_start();
+  const OpenFile file(path);
+  std::vector<LspHit> hits(rays.size());
+  cpu_tracer(file, 1)->trace(mode, rays, hits);
+  return 1e3 * (seconds_since_start() - start);
+}
+
+void add_load(Context& context, SceneUnderTest& scene, Table& loads) {
+  const Baked& baked = scene.base();
+  const std::span<const LspRay> rays = std::span(scene.surface(context.accuracy_rays()).rays).first(64);
+  Json row;
+  row["scene"] = scene.name();
+  row["file_mb"] = static_cast<double>(baked.file_bytes) * 1e-6;
+  for (const bool cold : {true, false}) {
+    for (const Mode& mode : {kModes[0], kModes[1]}) {
+      std::vector<double> times;
+      for (int k = 0; k < 5; ++k) times.push_back(first_ray_milliseconds(baked.path, mode, rays, cold));
+      row[std::string(cold ? "cold" : "warm") + (mode.approximate ? "_approximate_ms" : "_exact_ms")] =
+          timing_of(times).median;
+    }
+  }
+  if (context.vulkan) {
+    const OpenFile file(baked.path);
+    for (const LoadPath path : {LoadPath::kImport, LoadPath::kUpload}) {
+      try {
+        context.vulkan->load(file.scene(), LSP_USE_EXACT | LSP_USE_APPROXIMATE, path);
+        row[std::string("vulkan_") + name_of(path) + "_ms"] = 1e3 * context.vulkan->load_seconds();
+        if (path == LoadPath::kUpload) {
+          row["uploaded_mb"] = static_cast<double>(context.vulkan->bytes_uploaded()) * 1e-6;
+        }
+      } catch (const Failure& failure) {
+        context.warnings.push_back(scene.name() + ", " + name_of(path) + ": " + failure.what());
+      }
+    }
+  }
+  loads.rows.push_back(row);
+}
+
+}  // namespace
+
+Section paper_suite(Context& context) {
+  Section section{"paper", "The paper's table", {}, {}, {}, {}};
+  section.paragraphs.push_back(
+      "Indirect light's rays, per scene and structure: speed in million rays a second (Mrays/s) and times "
+      "the exact "
+      "trace of the same file in the same run; errors over surface rays against Embree's robust mode. \"1\" "
+      "and "
+      "\"all\" are threads. Ordered rays come pixel by pixel, shuffled ones in no order.");
+  Table table{"paper", "Bake, speed and error", "", {}, {}};
+  table.columns = {{"scene", "scene"},
+                   {"triangles", "triangles"},
+                   {"structure", "structure"},
+                   {"mode", "mode"},
+                   {"bake_seconds", "bake, s", 1},
+                   {"peak_mib", "bake's memory, MiB", 0},
+                   {"file_mb", "file, MB", 1},
+                   {"ordered_1_mrays", "ordered, 1, Mrays/s"},
+                   {"ordered_1_times", "x"},
+                   {"ordered_all_mrays", "ordered, all"},
+                   {"ordered_all_times", "x"},
+                   {"shuffled_1_mrays", "shuffled, 1"},
+                   {"shuffled_1_times", "x"},
+                   {"shuffled_all_mrays", "shuffled, all"},
+                   {"shuffled_all_times", "x"},
+                   {"vulkan_ordered_mrays", "Vulkan, ordered"},
+                   {"vulkan_ordered_times", "x"},
+                   {"vulkan_shuffled_mrays", "Vulkan, shuffled"},
+                   {"vulkan_shuffled_times", "x"}};
+  for (const Column& column : error_columns()) table.columns.push_back(column);
+  for (const Column& column : {Column{"nodes", "nodes a ray", 1}, Column{"shafts", "look-ups a ray", 1},
+                               Column{"triangle_tests", "triangles a ray", 1}}) {
+    table.columns.push_back(column);
+  }
+  Table loads{
+      "loading",
+      "Time to the first 64 rays",
+      "From opening the file to the answer; cold after telling the system to forget the file's pages (a "
+      "disk in memory stays warm). Vulkan: to the end of the first dispatch.",
+      {{"scene", "scene"},
+       {"file_mb", "file, MB", 1},
+       {"cold_exact_ms", "cold, exact, ms"},
+       {"cold_approximate_ms", "cold, approximate, ms"},
+       {"warm_exact_ms", "warm, exact, ms"},
+       {"warm_approximate_ms", "warm, approximate, ms"},
+       {"vulkan_import_ms", "Vulkan, import, ms"},
+       {"vulkan_upload_ms", "Vulkan, upload, ms"},
+       {"uploaded_mb", "uploaded, MB", 1}},
+      {}};
+  for (const auto& scene : context.scenes) {
+    context.progress("paper: " + scene->name());
+    const std::vector<RaySet> sets = {scene->diffuse(context.timing_rays(), false),
+                                      scene->diffuse(context.timing_rays(), true)};
+    for (const Structure& structure : structures(context.quick)) {
+      add_structure(context, *scene, structure, table, loads, sets);
+    }
+    add_load(context, *scene, loads);
+  }
+  section.tables = {std::move(table), std::move(loads)};
+  return section;
+}
+
+}  // namespace lsp::bench
