@@ -23,9 +23,9 @@ enum class Level {
 
 struct CheckOptions {
   Level level = Level::kStructure;
-  uint64_t memory_limit = uint64_t{8} << 30;  // for the unpacked sections of a packed file
-  uint32_t examples_per_rule = 4;             // how many findings of a rule are kept in full
-  std::optional<Hash128> source;              // hash of the source files to compare with, see hash.h
+  uint64_t memory_limit = uint64_t{8} << 30;     // for the unpacked sections of a packed file
+  uint32_t examples_per_rule = 4;                // how many findings of a rule are kept in full
+  std::optional<Hash128> source = std::nullopt;  // hash of the source files to compare with, see hash.h
 };
 
 Report check_file(std::span<const std::byte> bytes, const CheckOptions& options = {});

@@ -185,7 +185,8 @@ class GeometryCheck {
                   "is not the resolution divided by the box's extent");
   }
 
-  // All records of a primitive together. Where subtrees were left out there are no leaves to ask.
+  // All records of a primitive together. Whether its leaves cover it can only be asked of an exact file:
+  // elsewhere records that no shaft refers to were left out.
   void check_primitives() {
     std::vector<uint32_t> order(triangles_.size());
     std::iota(order.begin(), order.end(), 0u);
@@ -213,8 +214,9 @@ class GeometryCheck {
                         std::to_string(records[0]));
       return;
     }
+    if ((view_.header.required_features & LSP_FEATURE_EXACT) == 0) return;
     for (uint32_t i : records)
-      if (leaf_of_[i] == kNoLeaf) return;
+      if (leaf_of_[i] == kNoLeaf) return;  // the root's, whose box is that of everything
     for (const lsp_float3* corner : {&t.v0, &t.v1, &t.v2}) {
       const bool covered = std::any_of(records.begin(), records.end(), [&](uint32_t i) {
         return contains(slot_box(leaf_of_[i]), *corner, slack_);

@@ -2,7 +2,7 @@
 //
 // Bit words and candidates of different Line Spaces are disjoint in a sound file. Only disjoint ranges are
 // looked into, so that a hostile file with many Line Spaces over the same words costs no more than its size.
-#include <bit>
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstring>
@@ -54,11 +54,13 @@ class LineSpaceCheck {
       check_box(i);
       if (!check_format(i, shape)) {
         sound_ = false;
+        resync_ = true;  // nobody knows where its words and entries end
         continue;
       }
       if (spaces_[i].filled == 0) find(i, RuleId::kLineSpaceEmpty, kFilled, "no shaft is filled");
       check_words(i, shape);
       check_entries(i, shape);
+      resync_ = false;
     }
     check_ends();
     const bool declared = (view_.header.required_features & LSP_FEATURE_BINARY) != 0;
@@ -121,6 +123,7 @@ class LineSpaceCheck {
 
   void check_words(uint64_t i, const LineSpaceShape& shape) {
     const LspLineSpace& space = spaces_[i];
+    if (resync_ && shape.words != 0) next_word_ = std::max<uint64_t>(next_word_, space.word_first);
     const uint64_t expected = shape.words == 0 ? 0 : next_word_;
     if (space.word_first != expected)
       find(i, RuleId::kWordsNotCumulative, kWordFirst,
@@ -172,6 +175,7 @@ class LineSpaceCheck {
   void check_entries(uint64_t i, const LineSpaceShape& shape) {
     const LspLineSpace& space = spaces_[i];
     const uint64_t words = shape.candidate_words(space.filled);
+    if (resync_ && words != 0) next_candidate_ = std::max<uint64_t>(next_candidate_, space.candidate_first);
     const uint64_t expected = words == 0 ? 0 : next_candidate_;
     if (space.candidate_first != expected)
       find(i, RuleId::kEntriesNotCumulative, kCandidateFirst,
@@ -277,6 +281,7 @@ class LineSpaceCheck {
   uint64_t next_candidate_ = 0;
   bool any_binary_ = false;
   bool sound_ = true;
+  bool resync_ = false;
   bool offsets_were_sound_ = true;
 };
 

@@ -1,0 +1,168 @@
+// Damage of every kind, none of which may pass, fault or hang: cut files, flipped bits, extreme counts.
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "check.h"
+#include "image.h"
+#include "scenes.h"
+
+namespace {
+
+using namespace lsp;
+using namespace lsp::corpus;
+using namespace lsp::format;
+
+// A copy of exactly the right size, so that the sanitizers see any byte read beyond it.
+Report check_exact(const Bytes& bytes, Level level = Level::kGeometry) {
+  return check_file(Bytes(bytes), {.level = level, .memory_limit = uint64_t{1} << 26});
+}
+
+TEST(Damage, EveryPrefixOfAValidFileIsRefused) {
+  for (const char* name : {"full", "packed"}) {
+    for (const ValidFile& file : valid_files()) {
+      if (file.name != name) continue;
+      for (size_t size = 0; size < file.bytes.size(); ++size) {
+        const Bytes prefix(file.bytes.begin(), file.bytes.begin() + static_cast<ptrdiff_t>(size));
+        ASSERT_NE(check_exact(prefix, Level::kContainer).verdict(), Verdict::kValid)
+            << name << " cut to " << size;
+        if (size % 7 != 0) continue;
+        ASSERT_NE(check_exact(prefix).verdict(), Verdict::kValid) << name << " cut to " << size;
+      }
+    }
+  }
+}
+
+// The hashes cover every byte but padding, and padding is checked to be zero.
+TEST(Damage, EveryFlippedBitIsSeen) {
+  const Bytes good = encode(full_scene());
+  for (size_t at = 0; at < good.size(); ++at) {
+    Bytes bytes = good;
+    bytes[at] ^= static_cast<std::byte>(1 << at % 8);
+    const Report report = check_exact(bytes, Level::kContainer);
+    ASSERT_FALSE(report.findings().empty()) << "byte " << at;
+  }
+}
+
+TEST(Damage, ExtraBytesAreRefused) {
+  for (size_t extra : {1, 255, 256, 4096}) {
+    Bytes bytes = encode(full_scene());
+    bytes.resize(bytes.size() + extra);
+    EXPECT_TRUE(check_exact(bytes).has(RuleId::kExtraBytes)) << extra;
+  }
+}
+
+// Every 32-bit word of header and table, and every 64-bit field, set to extremes, with and without the hashes
+// made right again: nothing may fault, and what changed a meaning may not pass unseen.
+TEST(Damage, ExtremeValuesInHeaderAndTable) {
+  const Bytes good = encode(full_scene());
+  const size_t end = sizeof(LspHeader) + 8 * sizeof(LspSection);
+  for (size_t at = 0; at + 8 <= end; at += 4)
+    for (uint64_t value :
+         {uint64_t{0}, uint64_t{1}, uint64_t{0x7FFFFFFF}, uint64_t{0x80000000}, uint64_t{0xFFFFFFFF},
+          ~uint64_t{0}, ~uint64_t{255}, uint64_t{1} << 63, uint64_t{1} << 58})
+      for (size_t width : {4, 8})
+        for (bool repaired : {false, true}) {
+          Bytes bytes = good;
+          std::memcpy(bytes.data() + at, &value, width);
+          if (repaired) repair_hashes(bytes);
+          if (bytes == good) continue;
+          const Report report = check_exact(bytes);
+          ASSERT_TRUE(repaired || report.verdict() != Verdict::kValid) << at << " " << value << " " << width;
+        }
+}
+
+// The same over the sections: any word of any section.
+TEST(Damage, ExtremeValuesInSections) {
+  const Bytes good = encode(full_scene());
+  for (size_t at = sizeof(LspHeader) + 8 * sizeof(LspSection); at + 4 <= good.size(); at += 4)
+    for (uint32_t value : {0u, 1u, 0x7F800000u, 0x7FC00000u, 0x80000000u, 0xFFFFFFFFu}) {
+      Bytes bytes = good;
+      std::memcpy(bytes.data() + at, &value, 4);
+      repair_hashes(bytes);
+      check_exact(bytes);
+    }
+}
+
+TEST(Damage, ZeroCounts) {
+  Bytes bytes = encode(full_scene());
+  header_of(bytes).section_count = 0;
+  repair_hashes(bytes);
+  EXPECT_TRUE(check_exact(bytes).has(RuleId::kMissingSection));
+
+  Sections empty;
+  empty.header = full_scene().header;
+  empty.header.alignment = 256;
+  const Report report = check_exact(encode(empty));
+  EXPECT_NE(report.verdict(), Verdict::kValid) << "root 0 without nodes";
+}
+
+TEST(Damage, SwappedSections) {
+  const Sections good = to_sections(full_scene());
+  for (size_t a = 0; a < good.sections.size(); ++a)
+    for (size_t b = a + 1; b < good.sections.size(); ++b) {
+      Sections swapped = good;
+      std::swap(swapped.sections[a], swapped.sections[b]);
+      EXPECT_TRUE(check_exact(encode(swapped)).has(RuleId::kSectionOrder)) << a << " " << b;
+      Bytes bytes = encode(good);
+      std::swap(table_of(bytes)[a].offset, table_of(bytes)[b].offset);
+      repair_hashes(bytes);
+      EXPECT_NE(check_exact(bytes).verdict(), Verdict::kValid) << a << " " << b;
+    }
+}
+
+TEST(Damage, EveryPairOfSectionsOverlapping) {
+  const Bytes good = encode(full_scene());
+  for (size_t a = 0; a < 8; ++a)
+    for (size_t b = 0; b < 8; ++b) {
+      if (a == b) continue;
+      Bytes bytes = good;
+      table_of(bytes)[a].offset = table_of(bytes)[b].offset;
+      repair_hashes(bytes);
+      // A long section moved to the place of the last one ends behind the file instead.
+      const Report report = check_exact(bytes);
+      EXPECT_TRUE(report.has(RuleId::kSectionOverlap) || report.has(RuleId::kSectionOutside)) << a << " " << b;
+    }
+}
+
+TEST(Damage, OffsetsNearTheEndOfTheNumbers) {
+  for (uint64_t offset : {~uint64_t{0}, ~uint64_t{255}, uint64_t{1} << 63, (uint64_t{1} << 63) - 256}) {
+    Bytes bytes = encode(full_scene());
+    for (LspSection& section : table_of(bytes)) section.offset = offset;
+    repair_hashes(bytes);
+    EXPECT_TRUE(check_exact(bytes).has(RuleId::kSectionOutside)) << offset;
+    bytes = encode(full_scene());
+    header_of(bytes).section_table_offset = offset;
+    EXPECT_TRUE(check_exact(bytes).has(RuleId::kTableOffset)) << offset;
+  }
+}
+
+// Many Line Spaces that claim the same, largest tables: the check may not take longer than the file is large.
+TEST(Damage, ManyLineSpacesOverTheSameWords) {
+  Image image = full_scene();
+  image.words.resize(960000, {0, 0});
+  LspLineSpace space = image.line_spaces[0];
+  space.format = 32 | 4 << LSP_FORMAT_ENTRY_SHIFT;
+  space.word_first = 0;
+  image.line_spaces.assign(20000, space);
+  const Report report = check_exact(encode(image));
+  EXPECT_TRUE(report.has(RuleId::kWordsNotCumulative));
+  EXPECT_TRUE(report.has(RuleId::kWordsOutside) || report.has(RuleId::kWordsNotCumulative));
+}
+
+// A chain as deep as it is long: no recursion, and the depth is reported.
+TEST(Damage, AChainOfAMillionNodes) {
+  Image image = full_scene();
+  const LspNode link = image.nodes[0];
+  image.nodes.assign(1000000, link);
+  for (size_t i = 0; i < image.nodes.size(); ++i) {
+    image.nodes[i].child0 = static_cast<uint32_t>(i + 1);
+    image.nodes[i].child1 = LSP_NONE;
+    image.nodes[i].line_space0 = image.nodes[i].line_space1 = LSP_NONE;
+  }
+  image.nodes.back().child0 = LSP_LEAF_BIT;
+  const Report report = check_exact(encode(image));
+  EXPECT_TRUE(report.has(RuleId::kDepthExceeded));
+}
+
+}  // namespace
