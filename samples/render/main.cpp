@@ -113,6 +113,7 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
                                         {"height", options.height},
                                         {"samples", options.samples},
                                         {"bounces", options.bounces},
+                                        {"denoised", options.denoise},
                                         {"camera", to_string(camera)},
                                         {"backend", arguments.backend},
                                         {"device", tracer->device()},
@@ -174,6 +175,7 @@ int main(int argc, char** argv) {
   app.add_option("--ao-distance", a.options.ao_distance,
                  "Reach of --effect ao in diagonals of the scene (default 0.1)")
       ->check(CLI::Range(1e-6f, 1e6f));
+  app.add_flag("--denoise", a.options.denoise, "Filter the noise of few samples out of the picture");
   app.add_option("--sun", a.sun, "X,Y,Z: direction towards the sun");
   app.add_option("--exposure", a.exposure, "Stops to brighten a .png by (default 0)")
       ->check(CLI::Range(-20.0f, 20.0f));

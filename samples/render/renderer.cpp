@@ -5,10 +5,12 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <limits>
 
+#include "denoise.h"
 #include "sampler.h"
 
 namespace lsp::sample {
@@ -20,7 +22,15 @@ constexpr size_t kWavePixels = size_t{1} << 17;
 
 // Brighter single samples are cut: they would stay as white dots. The bound is far over anything that a
 // picture shows.
-constexpr float kLargestSample = 60.0f;
+constexpr float kLargestSample = 20.0f;
+
+// What a picture is the sum of, kept apart for the denoiser.
+enum Component : uint32_t {
+  kSharp,     // little noise or fine detail: background, emission, sun
+  kSmooth,    // light on diffuse surfaces from everywhere else
+  kMirrored,  // glossy reflections
+  kComponents,
+};
 
 // Surfaces rougher than this that are no metal have no glossy ray: their lobe is diffuse to the eye.
 constexpr float kRoughestGlossy = 0.7f;
@@ -37,7 +47,7 @@ enum Dimension : uint32_t {
 };
 
 struct Surface {
-  uint32_t item;  // in the wave
+  uint32_t item = 0;  // in the wave
   SurfacePoint point;
   glm::vec3 to_eye;
 };
@@ -52,6 +62,7 @@ struct Path {
 // A ray that brings `radiance` to its item unless something is in its way.
 struct LightRay {
   uint32_t item;
+  Component component;
   glm::vec3 radiance;
 };
 
@@ -70,6 +81,14 @@ class Renderer {
         picture_(options.width, options.height) {
     indirect_flags_ = options.approximate ? LSP_TRACE_APPROXIMATE : 0u;
     if (options.approximate && options.near_approximate) indirect_flags_ |= LSP_TRACE_NEAR_APPROXIMATE;
+    const size_t pixels = picture_.pixels.size();
+    for (size_t c = 0; c < kComponents; ++c) {
+      sum_[c] = Picture(options.width, options.height);
+      squares_[c].resize(pixels);
+    }
+    albedo_ = guides_.normal = guides_.position = Picture(options.width, options.height);
+    guides_.depth.resize(pixels);
+    met_.resize(pixels);
     order_pixels();
   }
 
@@ -81,27 +100,81 @@ class Renderer {
     for (size_t wave = 0; wave < waves; ++wave) {
       first_ = wave * kWavePixels;
       count_ = std::min(kWavePixels, order_.size() - first_);
-      sum_.assign(count_, glm::vec3(0.0f));
       for (uint32_t sample = 0; sample < options_.samples; ++sample) {
         sample_ = options_.first_sample + sample;
+        for (auto& component : now_) component.assign(count_, glm::vec3(0.0f));
         render_sample();
+        keep_sample();
         done += 1;
         if (progress) progress(done / total);
       }
-      for (size_t i = 0; i < count_; ++i) {
-        picture_.pixels[order_[first_ + i]] = sum_[i] / static_cast<float>(options_.samples);
-      }
     }
-    double luminance = 0;
+    finish();
+    double total_luminance = 0;
     for (const glm::vec3& p : picture_.pixels) {
-      luminance += static_cast<double>(glm::dot(p, glm::vec3(0.2126f, 0.7152f, 0.0722f)));
+      total_luminance += static_cast<double>(luminance(p));
     }
-    report_.mean_luminance = luminance / static_cast<double>(picture_.pixels.size());
+    report_.mean_luminance = total_luminance / static_cast<double>(picture_.pixels.size());
     report_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     return std::move(picture_);
   }
 
  private:
+  // Adds the wave's sample to the picture's sums.
+  void keep_sample() {
+    for_each(count_, [&](size_t i) {
+      const uint32_t pixel = order_[first_ + i];
+      for (size_t c = 0; c < kComponents; ++c) {
+        const glm::vec3 radiance = now_[c][i];
+        sum_[c].pixels[pixel] += radiance;
+        const float bright = luminance(radiance);
+        squares_[c][pixel] += bright * bright;
+      }
+    });
+  }
+
+  static float luminance(glm::vec3 color) { return glm::dot(color, glm::vec3(0.2126f, 0.7152f, 0.0722f)); }
+
+  // Divides the sums by the samples, denoises if asked for, and adds the components up.
+  void finish() {
+    const float n = static_cast<float>(options_.samples);
+    for (auto& component : sum_) {
+      for (glm::vec3& p : component.pixels) p /= n;
+    }
+    if (options_.denoise) arena_.execute([&] { denoise_components(); });
+    for (size_t i = 0; i < picture_.pixels.size(); ++i) {
+      picture_.pixels[i] = sum_[kSharp].pixels[i] + sum_[kSmooth].pixels[i] + sum_[kMirrored].pixels[i];
+    }
+  }
+
+  void denoise_components() {
+    const float n = static_cast<float>(options_.samples);
+    for (size_t i = 0; i < albedo_.pixels.size(); ++i) {
+      albedo_.pixels[i] = glm::max(albedo_.pixels[i] / n, glm::vec3(1e-3f));
+      const float hits = met_[i];
+      if (hits <= 0) continue;
+      guides_.position.pixels[i] /= hits;
+      guides_.depth[i] /= hits;
+      const float length = glm::length(guides_.normal.pixels[i]);
+      if (length > 0) guides_.normal.pixels[i] /= length;
+    }
+    guides_.pixel_angle_rad =
+        2.0f * std::tan(camera_.fov_degrees * kPi / 360.0f) / static_cast<float>(options_.height);
+    for (const Component c : {kSmooth, kMirrored}) {
+      std::vector<float> variance(met_.size());
+      for (size_t i = 0; i < variance.size(); ++i) {
+        const float mean = luminance(sum_[c].pixels[i]);
+        // The surface's colour is taken out of the light that it has coloured, and put back below.
+        const float colored = c == kSmooth ? luminance(albedo_.pixels[i]) : 1.0f;
+        variance[i] = std::max(squares_[c][i] / n - mean * mean, 0.0f) / (n * colored * colored);
+        if (c == kSmooth) sum_[c].pixels[i] /= albedo_.pixels[i];
+      }
+      sum_[c] = denoise(sum_[c], variance, guides_, c == kSmooth ? 5 : 3);
+      if (c != kSmooth) continue;
+      for (size_t i = 0; i < albedo_.pixels.size(); ++i) sum_[c].pixels[i] *= albedo_.pixels[i];
+    }
+  }
+
   // Pixels in blocks of 8 x 8: neighbours in a batch see the same parts of the scene.
   void order_pixels() {
     for (int by = 0; by < options_.height; by += 8) {
@@ -129,11 +202,11 @@ class Renderer {
     return sobol_point(sample_, seed);
   }
 
-  // Each light ray's item is its own, but rays of one item follow one another: the sum is made by one thread.
-  void add(uint32_t item, glm::vec3 radiance) {
+  // Called by one thread at a time, in the order of the batch: the sums do not depend on threads.
+  void add(uint32_t item, Component component, glm::vec3 radiance) {
     const float largest = std::max({radiance.x, radiance.y, radiance.z});
     if (!(largest > 0) || !std::isfinite(largest)) return;
-    sum_[item] += largest > kLargestSample ? radiance * (kLargestSample / largest) : radiance;
+    now_[component][item] += largest > kLargestSample ? radiance * (kLargestSample / largest) : radiance;
   }
 
   LspRay ray_from(const SurfacePoint& p, glm::vec3 direction, float tmax) const {
@@ -165,19 +238,31 @@ class Renderer {
       if (std::isfinite(hits_[i].t)) {
         surfaces_.push_back({i, {}, {}});
       } else if (options_.effect == Effect::kAmbientOcclusion) {
-        add(i, glm::vec3(1.0f));
+        add(i, kSharp, glm::vec3(1.0f));
       } else if (wants(Effect::kDirect)) {
-        add(i, sky_.radiance(to_glm(rays_[i].direction)));
+        add(i, kSharp, sky_.radiance(to_glm(rays_[i].direction)));
       }
     }
     for_each(surfaces_.size(), [&](size_t i) {
       Surface& s = surfaces_[i];
       s.point = scene_.surface(rays_[s.item], hits_[s.item]);
       s.to_eye = -to_glm(rays_[s.item].direction);
+      if (options_.denoise) keep_guides(s, hits_[s.item].t);
     });
     if (options_.effect == Effect::kAmbientOcclusion) return render_occlusion();
     if (wants(Effect::kDirect)) render_direct();
     if (options_.effect != Effect::kDirect) render_indirect();
+  }
+
+  // Primary rays have unit length, so that t is the distance. A pixel has one surface a sample.
+  void keep_guides(const Surface& s, float distance) {
+    const uint32_t pixel = order_[first_ + s.item];
+    met_[pixel] += 1.0f;
+    const bool occlusion = options_.effect == Effect::kAmbientOcclusion;
+    albedo_.pixels[pixel] += occlusion ? glm::vec3(1.0f) : s.point.base_color * (1.0f - s.point.metallic);
+    guides_.normal.pixels[pixel] += s.point.shading_normal;
+    guides_.position.pixels[pixel] += s.point.position;
+    guides_.depth[pixel] += distance;
   }
 
   void render_occlusion() {
@@ -189,7 +274,7 @@ class Renderer {
       const glm::vec3 direction =
           cosine_direction(s.point.shading_normal, random(s.item, kOcclusionDirection));
       rays_[i] = ray_from(s.point, above(s.point, direction), reach);
-      light_[i] = {s.item, glm::vec3(1.0f)};
+      light_[i] = {s.item, kSmooth, glm::vec3(1.0f)};
     });
     trace_light(indirect_flags_, true);
   }
@@ -199,11 +284,12 @@ class Renderer {
     begin_light(surfaces_.size());
     for_each(surfaces_.size(), [&](size_t i) {
       const Surface& s = surfaces_[i];
-      make_light_rays(i, s.item, s.point, s.point.base_color * (1.0f - s.point.metallic), kDirectFirst);
+      make_light_rays(i, s.item, s.point, s.point.base_color * (1.0f - s.point.metallic), kDirectFirst,
+                      kSmooth, kSharp);
     });
     end_light();
     trace_light(0, false);
-    for (const Surface& s : surfaces_) add(s.item, s.point.emission);
+    for (const Surface& s : surfaces_) add(s.item, kSharp, s.point.emission);
   }
 
   void render_indirect() {
@@ -289,11 +375,12 @@ class Renderer {
       const Path path = paths_[i];
       const bool mirrored = path.glossy && bounce == 0;
       if (!std::isfinite(path_hits_[i].t)) {
-        if (mirrored) add(path.item, path.throughput * sky_.radiance(to_glm(path_rays_[i].direction)));
+        if (mirrored)
+          add(path.item, kMirrored, path.throughput * sky_.radiance(to_glm(path_rays_[i].direction)));
         continue;
       }
       // What a diffuse surface gets straight from an emitter is direct light already.
-      if (mirrored) add(path.item, path.throughput * points_[i].emission);
+      if (mirrored) add(path.item, kMirrored, path.throughput * points_[i].emission);
       paths_[kept] = path;
       points_[kept] = points_[i];
       ++kept;
@@ -308,7 +395,9 @@ class Renderer {
     for_each(kept, [&](size_t i) {
       Path& path = paths_[i];
       path.throughput *= points_[i].base_color;
-      make_light_rays(i, path.item, points_[i], path.throughput, first + (path.glossy ? 3u : 0u));
+      const Component component = path.glossy ? kMirrored : kSmooth;
+      make_light_rays(i, path.item, points_[i], path.throughput, first + (path.glossy ? 3u : 0u), component,
+                      component);
     });
     end_light();
     trace_light(indirect_flags_, true);
@@ -345,10 +434,10 @@ class Renderer {
   // Fills the three slots of point `index`: a ray to the sky, one to the sun, one to an emitter; a slot whose
   // light is black makes no ray. `weight`: what the point passes on of arriving light, albedo included.
   void make_light_rays(size_t index, uint32_t item, const SurfacePoint& p, glm::vec3 weight,
-                       uint32_t dimension) {
+                       uint32_t dimension, Component component, Component sun_component) {
     LightRay* slot = &slots_[3 * index];
     LspRay* ray = &slot_rays_[3 * index];
-    for (int i = 0; i < 3; ++i) slot[i] = {item, glm::vec3(0.0f)};
+    for (int i = 0; i < 3; ++i) slot[i] = {item, i == 1 ? sun_component : component, glm::vec3(0.0f)};
 
     const glm::vec3 toward_sky = above(p, cosine_direction(p.shading_normal, random(item, dimension)));
     slot[0].radiance = weight * sky_.radiance(toward_sky);
@@ -426,7 +515,7 @@ class Renderer {
     (indirect ? report_.indirect_rays : report_.shadow_rays) += rays_.size();
     (indirect ? report_.indirect_seconds : report_.shadow_seconds) += seconds;
     for (size_t i = 0; i < light_.size(); ++i) {
-      if (!std::isfinite(hits_[i].t)) add(light_[i].item, light_[i].radiance);
+      if (!std::isfinite(hits_[i].t)) add(light_[i].item, light_[i].component, light_[i].radiance);
     }
   }
 
@@ -442,11 +531,18 @@ class Renderer {
   Picture picture_;
   std::vector<uint32_t> order_;
 
+  // Sums over the samples, by pixel.
+  std::array<Picture, kComponents> sum_;
+  std::array<std::vector<float>, kComponents> squares_;  // of luminance
+  Picture albedo_;
+  Guides guides_;
+  std::vector<float> met_;  // samples that met a surface
+
   // The wave's state, kept from sample to sample for its memory.
   size_t first_ = 0;
   size_t count_ = 0;
   uint32_t sample_ = 0;
-  std::vector<glm::vec3> sum_;
+  std::array<std::vector<glm::vec3>, kComponents> now_;  // the sample's radiance by item
   std::vector<LspRay> rays_;
   std::vector<LspHit> hits_;
   std::vector<Surface> surfaces_;

@@ -29,6 +29,7 @@ struct RenderOptions {
   uint32_t first_sample = 0;  // the sequence's first point: pictures of several runs can be averaged
   int bounces = 1;            // of indirect light
   float ao_distance = 0.1f;   // reach of ambient occlusion, in diagonals of the scene
+  bool denoise = false;       // see denoise.h
   int threads = 0;            // for shading, 0: all
 };
 
