@@ -1,0 +1,85 @@
+// Files on disk: what cannot be mapped, and what SceneFile makes of raw, packed and bad ones.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+
+#include "lsp/lsp.h"
+#include "lsp/scene_file.hpp"
+#include "scene_builder.h"
+
+namespace lsp::test {
+namespace {
+
+class Files : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = std::filesystem::temp_directory_path() / ("lsp_test_files_" + std::to_string(getpid()));
+    std::filesystem::create_directory(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+  std::string write(const char* name, const Bytes& bytes) {
+    const std::filesystem::path path = folder_ / name;
+    std::ofstream(path, std::ios::binary)
+        .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    return path.string();
+  }
+  static Exit exit_of(const std::string& path, uint64_t limit = UINT64_MAX) {
+    try {
+      const SceneFile file(path, limit);
+      return Exit::kDone;
+    } catch (const Failure& failure) {
+      EXPECT_EQ(failure.file(), path);
+      EXPECT_STRNE(failure.what(), "");
+      return failure.exit();
+    }
+  }
+  std::filesystem::path folder_;
+};
+
+TEST_F(Files, WhatCannotBeMapped) {
+  lsp_mapping mapping;
+  lsp_error error;
+  EXPECT_EQ(lsp_map_file((folder_ / "missing").c_str(), &mapping, &error), LSP_ERROR_FILE);
+  EXPECT_NE(std::string(error.message).find("No such file"), std::string::npos) << error.message;
+  EXPECT_EQ(lsp_map_file(folder_.c_str(), &mapping, &error), LSP_ERROR_FILE);
+  EXPECT_NE(std::string(error.message).find("directory"), std::string::npos) << error.message;
+  EXPECT_EQ(lsp_map_file("/dev/null", &mapping, &error), LSP_ERROR_FILE);
+  EXPECT_EQ(lsp_map_file(write("empty", {}).c_str(), &mapping, &error), LSP_ERROR_INVALID);
+  EXPECT_EQ(mapping.bytes, nullptr);
+  lsp_unmap_file(&mapping);  // nothing to do, and no harm
+}
+
+TEST_F(Files, RawIsMappedPackedIsUnpacked) {
+  const Parts parts = build_parts({});
+  const Bytes raw = write_raw(parts);
+  const SceneFile mapped(write("raw.lsp", raw));
+  EXPECT_FALSE(mapped.unpacked());
+  EXPECT_EQ(mapped.bytes_mapped(), raw.size());
+  const SceneFile unpacked(write("packed.lsp", write_packed(parts)));
+  EXPECT_TRUE(unpacked.unpacked());
+  EXPECT_EQ(unpacked.bytes_mapped(), 0u);
+  ASSERT_EQ(unpacked.scene().size, raw.size());
+  EXPECT_EQ(memcmp(unpacked.scene().bytes, mapped.scene().bytes, raw.size()), 0);
+}
+
+TEST_F(Files, ExitCodes) {
+  const Parts parts = build_parts({});
+  Bytes cut = write_raw(parts);
+  cut.resize(cut.size() / 2);
+  Bytes newer = write_raw(parts);
+  header_of(newer).version_major = 2;
+  Bytes damaged = write_packed(parts);
+  damaged[section_of(damaged, LSP_SECTION_NODE).offset + 9] ^= 0xFF;
+  EXPECT_EQ(exit_of((folder_ / "missing.lsp").string()), Exit::kFile);
+  EXPECT_EQ(exit_of(write("empty.lsp", {})), Exit::kInvalid);
+  EXPECT_EQ(exit_of(write("cut.lsp", cut)), Exit::kInvalid);
+  EXPECT_EQ(exit_of(write("newer.lsp", newer)), Exit::kUnsupported);
+  EXPECT_EQ(exit_of(write("damaged.lsp", damaged)), Exit::kInvalid);
+  EXPECT_EQ(exit_of(write("large.lsp", write_packed(parts)), 4096), Exit::kLimit);
+}
+
+}  // namespace
+}  // namespace lsp::test

@@ -1,0 +1,195 @@
+// lsp-trace as its users run it: options, files, figures and exit codes.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "lsp/lsp.h"
+#include "scene_builder.h"
+
+namespace lsp::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string read_file(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+class LspTrace : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() / ("lsp_test_trace_" + std::to_string(getpid()));
+    fs::create_directory(folder_);
+    const Parts parts = build_parts({});
+    raw_ = write_raw(parts);
+    write("raw.lsp", raw_.data(), raw_.size());
+    const Bytes packed = write_packed(parts);
+    write("packed.lsp", packed.data(), packed.size());
+    Random random(4);
+    for (int i = 0; i < 10000; ++i) {
+      rays_.push_back({{random.between(-2, 2), random.between(-2, 2), random.between(-2, 2)},
+                       0,
+                       {random.between(-1, 1), random.between(-1, 1), random.between(-1, 1)},
+                       1e30f});
+    }
+    rays_[17].direction = {0, 0, 0};
+    rays_[99].tmin = 2e30f;
+    write("rays.bin", rays_.data(), rays_.size() * sizeof(LspRay));
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  void write(const char* name, const void* data, size_t bytes) {
+    std::ofstream(folder_ / name, std::ios::binary)
+        .write(static_cast<const char*>(data), static_cast<std::streamsize>(bytes));
+  }
+
+  // Runs "lsp-trace ARGUMENTS" in the folder; output and errors are left in out.txt and err.txt.
+  int run(const std::string& arguments) {
+    const std::string command =
+        "cd '" + folder_.string() + "' && '" LSP_TRACE_PROGRAM "' " + arguments + " > out.txt 2> err.txt";
+    const int status = std::system(command.c_str());
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+  std::string out() { return read_file(folder_ / "out.txt"); }
+  std::string err() { return read_file(folder_ / "err.txt"); }
+
+  std::vector<LspHit> expected(uint32_t flags, lsp_trace_counts* counts) {
+    lsp_scene scene;
+    lsp_open(raw_.data(), raw_.size(), &scene, nullptr);
+    std::vector<LspHit> hits(rays_.size());
+    const lsp_trace_options options{flags, 0};
+    lsp_trace(&scene, &options, rays_.data(), hits.data(), hits.size(), counts, nullptr);
+    return hits;
+  }
+  void expect_hits(const std::vector<LspHit>& hits) {
+    const std::string got = read_file(folder_ / "hits.bin");
+    ASSERT_EQ(got.size(), hits.size() * sizeof(LspHit));
+    EXPECT_EQ(memcmp(got.data(), hits.data(), got.size()), 0);
+  }
+
+  fs::path folder_;
+  Bytes raw_;
+  std::vector<LspRay> rays_;
+};
+
+constexpr const char* kFiles = " --rays rays.bin --hits hits.bin ";
+
+TEST_F(LspTrace, WritesTheLibrarysHits) {
+  const struct {
+    const char* options;
+    uint32_t flags;
+  } cases[] = {
+      {"", LSP_TRACE_APPROXIMATE},
+      {"--mode exact", 0},
+      {"--mode exact --query any", LSP_TRACE_ANY_HIT},
+      {"--mode approximate --near approximate", LSP_TRACE_APPROXIMATE | LSP_TRACE_NEAR_APPROXIMATE},
+      {"--mode exact --threads 3", 0},
+  };
+  for (const auto& c : cases) {
+    for (const char* file : {"raw.lsp", "packed.lsp"}) {
+      SCOPED_TRACE(std::string(file) + " " + c.options);
+      ASSERT_EQ(run(file + std::string(kFiles) + c.options), 0) << err();
+      EXPECT_EQ(err(), "");
+      expect_hits(expected(c.flags, nullptr));
+    }
+  }
+}
+
+TEST_F(LspTrace, ReportsWhatItDid) {
+  ASSERT_EQ(run(std::string("raw.lsp") + kFiles + "--json --repeat 3 --mode exact"), 0) << err();
+  lsp_trace_counts counts{};
+  expected(0, &counts);
+  const nlohmann::json json = nlohmann::json::parse(out());
+  EXPECT_EQ(json["rays"], 10000);
+  EXPECT_EQ(json["invalid"], 2);
+  EXPECT_EQ(json["hits"], counts.hits);
+  EXPECT_EQ(json["seconds"].size(), 3u);
+  EXPECT_GT(json["mrays_per_second"], 0.0);
+  EXPECT_EQ(json["mode"], "exact");
+  EXPECT_EQ(json["load_path"], "mapped");
+  EXPECT_EQ(json["bytes_mapped"], raw_.size());
+  EXPECT_GT(json["bytes_paged_in"], 0);
+  EXPECT_LE(json["bytes_paged_in"], raw_.size());
+  EXPECT_EQ(json["bytes_uploaded"], 0);
+  EXPECT_DOUBLE_EQ(json["nodes_per_ray"], static_cast<double>(counts.nodes) / 10000);
+  EXPECT_DOUBLE_EQ(json["triangles_per_ray"], static_cast<double>(counts.triangles) / 10000);
+  EXPECT_FALSE(json["device"].get<std::string>().empty());
+}
+
+TEST_F(LspTrace, ExitCodes) {
+  write("odd.bin", rays_.data(), 33);
+  write("none.bin", rays_.data(), 0);
+  write("cut.lsp", raw_.data(), 1000);
+  const auto files = [](const char* rays, const char* hits) {
+    return std::string(" --rays ") + rays + " --hits " + hits + " ";
+  };
+  EXPECT_EQ(run("--help"), 0);
+  EXPECT_EQ(run("--version"), 0);
+  EXPECT_NE(out().find("0.1.0"), std::string::npos);
+  EXPECT_EQ(run(""), 1);
+  EXPECT_EQ(run("raw.lsp"), 1);
+  EXPECT_EQ(run("raw.lsp --mode sideways" + files("rays.bin", "h")), 1);
+  EXPECT_EQ(run("missing.lsp" + files("rays.bin", "h")), 2);
+  EXPECT_EQ(err().rfind("lsp-trace: missing.lsp: ", 0), 0u) << err();
+  EXPECT_EQ(run("raw.lsp" + files("missing.bin", "h")), 2);
+  EXPECT_EQ(run("raw.lsp" + files("rays.bin", "no/such/folder/h")), 2);
+  EXPECT_EQ(run("raw.lsp" + files("odd.bin", "h")), 3);
+  EXPECT_EQ(run("cut.lsp" + files("rays.bin", "h")), 3);
+  EXPECT_FALSE(fs::exists(folder_ / "h"));
+  EXPECT_EQ(run("raw.lsp" + files("none.bin", "h")), 0) << err();
+  EXPECT_EQ(fs::file_size(folder_ / "h"), 0u);
+  EXPECT_EQ(run("raw.lsp --quiet" + files("rays.bin", "h")), 0);
+  EXPECT_EQ(out() + err(), "");
+}
+
+TEST_F(LspTrace, FilesWithoutWhatIsAskedFor) {
+  BuildOptions options;
+  options.line_spaces = false;
+  const Bytes exact = write_raw(build_parts(options));
+  write("exact.lsp", exact.data(), exact.size());
+  EXPECT_EQ(run(std::string("exact.lsp") + kFiles), 0) << err();  // exact by itself
+  EXPECT_EQ(run(std::string("exact.lsp --mode approximate") + kFiles), 5);
+  options.line_spaces = true;
+  options.exact = false;
+  const Bytes approximate = write_raw(build_parts(options));
+  write("approximate.lsp", approximate.data(), approximate.size());
+  EXPECT_EQ(run(std::string("approximate.lsp") + kFiles), 0) << err();
+  EXPECT_EQ(run(std::string("approximate.lsp --mode exact") + kFiles), 5);
+}
+
+// A failed run leaves an older result as it was, and nothing beside it.
+TEST_F(LspTrace, FailureLeavesOldHits) {
+  write("hits.bin", "old", 3);
+  EXPECT_EQ(run(std::string("missing.lsp") + kFiles), 2);
+  EXPECT_EQ(read_file(folder_ / "hits.bin"), "old");
+  for (const auto& entry : fs::directory_iterator(folder_)) {
+    EXPECT_EQ(entry.path().string().find(".tmp"), std::string::npos) << entry.path();
+  }
+}
+
+TEST_F(LspTrace, VulkanGivesTheSameFile) {
+  for (const char* load : {"import", "upload"}) {
+    const int code = run(std::string("raw.lsp --backend vulkan --json --load ") + load + kFiles);
+    if (code == 5) GTEST_SKIP() << err();
+    ASSERT_EQ(code, 0) << err();
+    expect_hits(expected(LSP_TRACE_APPROXIMATE, nullptr));
+    const nlohmann::json json = nlohmann::json::parse(out());
+    EXPECT_EQ(json["load_path"], load);
+    EXPECT_EQ(json["bytes_imported"] == 0, std::string(load) == "upload");
+    EXPECT_EQ(json["bytes_uploaded"] == 0, std::string(load) == "import");
+    EXPECT_EQ(json["retraced"], 0);
+    lsp_trace_counts counts{};
+    expected(LSP_TRACE_APPROXIMATE, &counts);
+    EXPECT_EQ(json["hits"], counts.hits);
+    EXPECT_DOUBLE_EQ(json["shafts_per_ray"], static_cast<double>(counts.shafts) / 10000);
+  }
+}
+
+}  // namespace
+}  // namespace lsp::test
