@@ -112,6 +112,7 @@ void header(Collector& c) {
   c.header(RuleId::kDepthBound, "max_depth is 97", [](LspHeader& h) { h.max_depth = 97; });
   c.header(RuleId::kAddressable, "node_count is 2^30 + 1",
            [](LspHeader& h) { h.node_count = (1u << 30) + 1; });
+  c.header(RuleId::kStepsBound, "max_steps is 2^32 - 1", [](LspHeader& h) { h.max_steps = 0xFFFFFFFFu; });
   c.sections(RuleId::kSectionCount, "249 unknown optional sections are added", [](Sections& s) {
     for (uint32_t i = 0; i < 249; ++i) s.sections.push_back(make_section(0x30303078u + (i << 8), 0, 1, {}));
   });

@@ -85,7 +85,7 @@ class Builder {
       header.line_space_depth = *std::max_element(options_.depths.begin(), options_.depths.end());
     build(header.root, header.root_line_space, 0, input_.size(), bounds, 0);
     header.max_stack = std::max(header.max_depth, 1u);
-    header.max_steps = static_cast<uint32_t>(image_.nodes.size()) + leaves_ + 1;
+    header.max_steps = static_cast<uint32_t>(image_.nodes.size()) + ends_ + 1;
     shade();
     header.required_features =
         (options_.exact ? LSP_FEATURE_EXACT : 0) |
@@ -117,8 +117,8 @@ class Builder {
       if (!below_goes) {
         child =
             LSP_LEAF_BIT | static_cast<uint32_t>(end - first - 1) << LSP_LEAF_COUNT_SHIFT | triangle_first;
-        ++leaves_;
       }
+      ++ends_;
       image_.header.max_depth = std::max(image_.header.max_depth, depth);
     } else {
       child = static_cast<uint32_t>(image_.nodes.size());
@@ -251,7 +251,7 @@ class Builder {
   std::vector<LspTriangle> input_;
   Image image_;
   std::vector<std::vector<uint32_t>> tables_;  // per Line Space: the entry of every shaft
-  uint32_t leaves_ = 0;
+  uint32_t ends_ = 0;                          // leaves, and Line Spaces in place of them
 };
 
 void add_quad(std::vector<LspTriangle>& triangles, const lsp_float3& a, const lsp_float3& b,

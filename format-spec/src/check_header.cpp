@@ -9,6 +9,7 @@ namespace lsp::format {
 namespace {
 
 constexpr uint32_t kMaxSections = 256;
+constexpr uint32_t kStepsSlack = 16;
 constexpr uint32_t kMaxReferences = 1u << 30;  // a traversal marks references in their two highest bits
 
 // One finding about a field of the header.
@@ -107,6 +108,10 @@ void check_limits(const LspHeader& header, Report& report) {
   if (header.max_depth > LSP_MAX_STACK)
     LSP_HEADER_FINDING(kDepthBound, max_depth,
                        "is " + std::to_string(header.max_depth) + ", the limit is 96");
+  if (header.max_steps > 2 * uint64_t{header.node_count} + kStepsSlack)
+    LSP_HEADER_FINDING(
+        kStepsBound, max_steps,
+        "is " + std::to_string(header.max_steps) + " for " + std::to_string(header.node_count) + " nodes");
   if (header.max_leaf_triangles > LSP_MAX_LEAF_TRIANGLES)
     LSP_HEADER_FINDING(kMaxLeaf, max_leaf_triangles,
                        "is " + std::to_string(header.max_leaf_triangles) + ", the limit is 16");

@@ -118,6 +118,7 @@ class TreeCheck {
       if (at.line_space != LSP_NONE && exact_)
         find(RuleId::kChildMissing, at, Field::kChild,
              "nothing is below the Line Space, but the file is exact");
+      if (at.line_space != LSP_NONE) ++ends_;
     } else if (at.child & LSP_LEAF_BIT) {
       check_leaf(at);
     } else {
@@ -127,7 +128,7 @@ class TreeCheck {
   }
 
   void check_leaf(const Slot& at) {
-    ++leaves_;
+    ++ends_;
     const uint64_t first = at.child & LSP_LEAF_FIRST_MASK;
     const uint64_t count = (at.child >> LSP_LEAF_COUNT_SHIFT & LSP_LEAF_COUNT_MASK) + 1;
     if (!in_range(first, count, header_.triangle_count) && at.side >= 0)
@@ -217,10 +218,11 @@ class TreeCheck {
       report_.add(RuleId::kStackExceeded, offsetof(LspHeader, max_stack), 4, "/header/max_stack",
                   "is " + std::to_string(header_.max_stack) + ", but a traversal may need " +
                       std::to_string(deepest_));
-    if (nodes_.size() + leaves_ > header_.max_steps)
+    if (nodes_.size() + ends_ > header_.max_steps)
       report_.add(RuleId::kStepsExceeded, offsetof(LspHeader, max_steps), 4, "/header/max_steps",
                   "is " + std::to_string(header_.max_steps) + ", but there are " +
-                      std::to_string(nodes_.size()) + " nodes and " + std::to_string(leaves_) + " leaves");
+                      std::to_string(nodes_.size()) + " nodes and " + std::to_string(ends_) +
+                      " leaves or Line Spaces in place of them");
   }
 
   // What is below a slot; its own Line Space not counted.
@@ -336,7 +338,7 @@ class TreeCheck {
   std::vector<bool> line_space_seen_;
   std::vector<Subtree> subtrees_;
   uint32_t deepest_ = 0;
-  uint64_t leaves_ = 0;
+  uint64_t ends_ = 0;  // leaves, and Line Spaces that stand for a subtree left out
 };
 
 }  // namespace

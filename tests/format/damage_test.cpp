@@ -121,7 +121,8 @@ TEST(Damage, EveryPairOfSectionsOverlapping) {
       repair_hashes(bytes);
       // A long section moved to the place of the last one ends behind the file instead.
       const Report report = check_exact(bytes);
-      EXPECT_TRUE(report.has(RuleId::kSectionOverlap) || report.has(RuleId::kSectionOutside)) << a << " " << b;
+      EXPECT_TRUE(report.has(RuleId::kSectionOverlap) || report.has(RuleId::kSectionOutside))
+          << a << " " << b;
     }
 }
 

@@ -1,0 +1,171 @@
+// The validator and the loader agree: what the validator passes, the loader opens and traces; what the loader
+// refuses, the validator refuses. On the corpus, and on ten thousand files damaged at random.
+#include <gtest/gtest.h>
+#include <lsp/lsp.h>
+
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <new>
+
+#include "check.h"
+#include "mutations.h"
+#include "mutator.h"
+#include "scenes.h"
+
+namespace {
+
+using namespace lsp;
+using namespace lsp::corpus;
+using namespace lsp::format;
+
+constexpr uint64_t kMemoryLimit = uint64_t{1} << 26;
+
+// Bytes at a multiple of 16 and of exactly their size, so that the sanitizers see any access beyond them.
+class AlignedBytes {
+ public:
+  explicit AlignedBytes(size_t size) : data_(new (std::align_val_t{16}) std::byte[size]), size_(size) {}
+  explicit AlignedBytes(const Bytes& bytes) : AlignedBytes(bytes.size()) {
+    if (size_ != 0) std::memcpy(data_.get(), bytes.data(), size_);
+  }
+  std::byte* data() { return data_.get(); }
+  size_t size() const { return size_; }
+
+ private:
+  struct Free {
+    void operator()(std::byte* bytes) const { operator delete[](bytes, std::align_val_t{16}); }
+  };
+  std::unique_ptr<std::byte[], Free> data_;
+  size_t size_;
+};
+
+// The file in memory as the tracer takes it; unpacked when it is packed.
+struct Opened {
+  lsp_status status = LSP_OK;
+  lsp_error error{};
+  std::unique_ptr<AlignedBytes> bytes;
+  lsp_scene scene{};
+};
+
+Opened open(const Bytes& file) {
+  Opened opened;
+  opened.bytes = std::make_unique<AlignedBytes>(file);
+  opened.status = lsp_open(opened.bytes->data(), file.size(), &opened.scene, &opened.error);
+  if (opened.status != LSP_ERROR_UNSUPPORTED) return opened;
+  uint64_t size = 0;
+  const lsp_status status = lsp_unpacked_size(opened.bytes->data(), file.size(), &size, &opened.error);
+  if (status != LSP_OK || size > kMemoryLimit) return opened;
+  auto raw = std::make_unique<AlignedBytes>(size);
+  opened.status = lsp_unpack(opened.bytes->data(), file.size(), raw->data(), size, &opened.error);
+  if (opened.status != LSP_OK) return opened;
+  opened.bytes = std::move(raw);
+  opened.status = lsp_open(opened.bytes->data(), opened.bytes->size(), &opened.scene, &opened.error);
+  return opened;
+}
+
+// Sixteen rays through the scene's bounds in every mode that the file allows; their answers make sense.
+void trace(const lsp_scene& scene, const std::string& context) {
+  const LspHeader& header = *scene.header;
+  LspRay rays[16];
+  LspHit hits[16];
+  Random random(42);
+  const lsp_float3 &lo = header.bounds_min, &hi = header.bounds_max;
+  for (LspRay& ray : rays) {
+    ray.origin = {lo.x + (hi.x - lo.x) * random.unit(), lo.y + (hi.y - lo.y) * random.unit(),
+                  lo.z + (hi.z - lo.z) * random.unit()};
+    ray.direction = {random.unit() - 0.5f, random.unit() - 0.5f, random.unit() - 0.5f};
+    ray.tmin = 0;
+    ray.tmax = INFINITY;
+  }
+  rays[0].direction = {1, 0, 0};
+  rays[1].direction = {0, -1, 0};
+  rays[2].direction = {0, 0, 0};
+  const bool exact = header.required_features & LSP_FEATURE_EXACT;
+  const bool approximate = header.required_features & LSP_FEATURE_LINE_SPACES;
+  for (uint32_t flags = 0; flags < 8; ++flags) {
+    const bool able = flags & LSP_TRACE_APPROXIMATE ? approximate : exact;
+    const lsp_trace_options options{flags, flags & LSP_TRACE_NEAR_APPROXIMATE ? 0.5f : 0.0f};
+    lsp_trace_counts counts{};
+    const lsp_status status = lsp_trace(&scene, &options, rays, hits, 16, &counts, nullptr);
+    ASSERT_EQ(status, able ? LSP_OK : LSP_ERROR_UNSUPPORTED) << context;
+    if (!able) continue;
+    for (const LspHit& hit : hits) {
+      ASSERT_EQ(hit.flags & LSP_HIT_INCOMPLETE, 0u) << context << ", flags " << flags;
+      if (hit.primitive == LSP_NONE) continue;
+      ASSERT_TRUE(hit.t > 0) << context;
+    }
+  }
+}
+
+void expect_agreement(const Bytes& bytes, const std::string& context, uint64_t& valid,
+                      uint64_t& opened_count) {
+  const Report report = check_file(bytes, {.level = Level::kStructure, .memory_limit = kMemoryLimit});
+  Opened opened = open(bytes);
+  if (report.verdict() == Verdict::kValid) {
+    ++valid;
+    ASSERT_EQ(opened.status, LSP_OK) << context << ": valid, but refused: " << opened.error.message;
+    trace(opened.scene, context);
+  }
+  if (opened.status == LSP_OK) {
+    ++opened_count;
+    // What was not validated may have wrong bounds, but never makes the tracer leave the file's bytes. A loop
+    // bound that is too large would only take long.
+    if (report.verdict() != Verdict::kValid && opened.scene.header->max_steps < 1000000) {
+      LspRay ray = {{0, 1, 0}, 0, {0.1f, 0.2f, 0.3f}, INFINITY};
+      LspHit hit;
+      for (uint32_t flags = 0; flags < 8; ++flags) {
+        const lsp_trace_options options{flags, 0.25f};
+        lsp_trace(&opened.scene, &options, &ray, &hit, 1, nullptr, nullptr);
+      }
+    }
+  } else {
+    ASSERT_NE(report.verdict(), Verdict::kValid)
+        << context << ": refused by the loader: " << opened.error.message;
+    ASSERT_FALSE(report.findings().empty()) << context;
+  }
+}
+
+TEST(Loader, AgreesOnTheCorpus) {
+  uint64_t valid = 0, opened = 0;
+  for (const ValidFile& file : valid_files()) expect_agreement(file.bytes, file.name, valid, opened);
+  EXPECT_EQ(valid, valid_files().size());
+  for (const InvalidFile& file : invalid_files()) expect_agreement(file.bytes, file.name, valid, opened);
+}
+
+TEST(Loader, AgreesOnTenThousandRandomMutations) {
+  std::vector<ValidFile> files = valid_files();
+  // The largest differs from others by its padding only.
+  std::erase_if(files, [](const ValidFile& file) { return file.bytes.size() > 65536; });
+  uint64_t valid = 0, opened = 0;
+  for (uint64_t seed = 0; seed < 10000; ++seed) {
+    Random random(seed);
+    const ValidFile& file = files[random.below(files.size())];
+    Bytes bytes = file.bytes;
+    mutate(bytes, random);
+    expect_agreement(bytes, file.name + " with seed " + std::to_string(seed), valid, opened);
+    if (HasFatalFailure()) return;
+  }
+  RecordProperty("valid", static_cast<int>(valid));
+  RecordProperty("opened", static_cast<int>(opened));
+  std::printf("of 10,000 mutations %llu are valid, %llu open\n", static_cast<unsigned long long>(valid),
+              static_cast<unsigned long long>(opened));
+  // The mutations are worth something only if many files pass and many fail.
+  EXPECT_GT(valid, 500u);
+  EXPECT_LT(valid, 9000u);
+}
+
+TEST(Loader, UnpackOfPackIsTheSameFile) {
+  for (uint32_t alignment : {256u, 4096u, 65536u}) {
+    Image image = full_scene();
+    image.alignment = alignment;
+    const Bytes raw = encode(image);
+    Sections sections = to_sections(image);
+    pack(sections);
+    Opened opened = open(encode(sections));
+    ASSERT_EQ(opened.status, LSP_OK) << opened.error.message;
+    ASSERT_EQ(opened.bytes->size(), raw.size());
+    EXPECT_EQ(std::memcmp(opened.bytes->data(), raw.data(), raw.size()), 0) << alignment;
+  }
+}
+
+}  // namespace
