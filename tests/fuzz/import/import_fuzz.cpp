@@ -1,0 +1,57 @@
+// One mesh file, any bytes: import must return a sound mesh or throw Failure, within a memory limit and in a
+// moment. Built once a format; LSP_FUZZ_EXTENSION chooses it. Starting points are any small meshes:
+//   import_fuzz_ply -rss_limit_mb=2048 -timeout=10 CORPUS SEEDS
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+
+#include "import/import.h"
+#include "lsp/program.h"
+
+namespace {
+
+void require(bool good, const char* what) {
+  if (good) return;
+  std::fprintf(stderr, "unsound mesh: %s\n", what);
+  std::abort();
+}
+
+void check(const lsp::Mesh& mesh) {
+  const size_t count = mesh.triangles.size();
+  require(count > 0, "empty");
+  require(count + mesh.rejected.total() == mesh.primitive_count, "triangles lost");
+  require(
+      mesh.primitives.size() == count && mesh.normals.size() == count && mesh.material_ids.size() == count,
+      "arrays of different lengths");
+  for (size_t t = 0; t < count; ++t) {
+    require(mesh.material_ids[t] < mesh.materials.size(), "material out of range");
+    for (int i = 0; i < 3; ++i) {
+      require(mesh.triangles[t][i] < mesh.positions.size(), "index out of range");
+      require(std::abs(glm::length(mesh.normals[t][i]) - 1.0f) < 1e-4f, "normal not of unit length");
+    }
+  }
+  for (const glm::vec3& p : mesh.positions) {
+    require(std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z), "position not finite");
+  }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  static const std::filesystem::path path =
+      "/dev/shm/lsp_import_fuzz_" + std::to_string(getpid()) + LSP_FUZZ_EXTENSION;
+  {
+    std::ofstream file(path, std::ios::binary | std::ios::trunc);
+    file.write(reinterpret_cast<const char*>(data), std::streamsize(size));
+  }
+  try {
+    check(lsp::import_meshes({&path, 1}, {.memory_limit = 256 << 20}));
+  } catch (const lsp::Failure& failure) {
+    require(failure.exit() != lsp::Exit::kInternal && failure.what()[0] != '\0', "failure without a reason");
+  }
+  return 0;
+}
