@@ -13,7 +13,7 @@ namespace {
 
 struct Arguments {
   std::string file;
-  std::string output;
+  std::vector<std::string> outputs;
   std::string effect = "all";
   std::string mode = "exact";
   std::string near_field = "exact";
@@ -67,10 +67,11 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
   options.approximate = arguments.mode == "approximate";
   options.near_approximate = arguments.near_field == "approximate";
   parse_size(arguments.size, options);
-  const std::filesystem::path output = arguments.output;
-  if (output.extension() != ".png" && output.extension() != ".pfm") {
-    throw Failure(Exit::kUsage, arguments.output,
-                  "pictures are written as .png or .pfm; choose one of the two");
+  for (const std::string& output : arguments.outputs) {
+    const std::filesystem::path ending = std::filesystem::path(output).extension();
+    if (ending != ".png" && ending != ".pfm") {
+      throw Failure(Exit::kUsage, output, "pictures are written as .png or .pfm; choose one of the two");
+    }
   }
   const Sky sky = parse_sun(arguments.sun);
   Camera camera = arguments.camera.empty() ? Camera{} : parse_camera(arguments.camera);
@@ -91,20 +92,23 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
 
   const bool show_progress = !common.quiet && isatty(STDERR_FILENO) != 0;
   RenderReport report;
-  Picture picture = render(scene, sky, camera, options, *tracer, report, [&](double done) {
+  const Picture picture = render(scene, sky, camera, options, *tracer, report, [&](double done) {
     if (show_progress) std::fprintf(stderr, "\rrendering %3.0f %%", 100.0 * done);
   });
   if (show_progress) std::fprintf(stderr, "\r               \r");
   const bool grey = options.effect == Effect::kAmbientOcclusion;
-  if (output.extension() == ".png" && !grey) {
-    for (glm::vec3& pixel : picture.pixels) pixel *= std::exp2(arguments.exposure);
+  for (const std::string& output : arguments.outputs) {
+    Picture shown = picture;
+    if (std::filesystem::path(output).extension() == ".png" && !grey) {
+      for (glm::vec3& pixel : shown.pixels) pixel *= std::exp2(arguments.exposure);
+    }
+    write_picture(output, shown, grey ? Transfer::kDisplay : Transfer::kToneMapped);
   }
-  write_picture(output, picture, grey ? Transfer::kDisplay : Transfer::kToneMapped);
 
   const double rate = mega(report.indirect_rays, report.indirect_seconds);
   if (common.json) {
     std::cout << nlohmann::ordered_json{{"file", arguments.file},
-                                        {"output", arguments.output},
+                                        {"outputs", arguments.outputs},
                                         {"effect", arguments.effect},
                                         {"mode", arguments.mode},
                                         {"near", arguments.near_field},
@@ -130,7 +134,7 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
                      .dump(2)
               << "\n";
   } else if (!common.quiet) {
-    std::printf("%s: %d x %d, %u samples, %s, %s, %s\n", arguments.output.c_str(), options.width,
+    std::printf("%s: %d x %d, %u samples, %s, %s, %s\n", arguments.outputs.front().c_str(), options.width,
                 options.height, options.samples, arguments.effect.c_str(), arguments.mode.c_str(),
                 tracer->device().c_str());
     std::printf(
@@ -152,8 +156,10 @@ int main(int argc, char** argv) {
   Arguments a;
   add_common_options(app, kProgram, common);
   app.add_option("FILE.lsp", a.file, "The baked scene")->required();
-  app.add_option("-o,--output", a.output, "The picture: .png (tone-mapped) or .pfm (linear floats)")
-      ->required();
+  app.add_option("-o,--output", a.outputs,
+                 "The picture: .png (tone-mapped) or .pfm (linear floats); may be given twice")
+      ->required()
+      ->allow_extra_args(false);
   app.add_option("--effect", a.effect, "ao, diffuse, glossy, all or direct (default all)")
       ->check(CLI::IsMember({"ao", "diffuse", "glossy", "all", "direct"}));
   app.add_option("--mode", a.mode, "exact or approximate (default exact)")

@@ -1,0 +1,77 @@
+#!/usr/bin/env bash
+# From nothing to indirect light: installs what is missing, builds, bakes, validates, renders and compares.
+#
+#   ./samples/demo.sh            the procedural atrium
+#   ./samples/demo.sh MESH...    your own mesh: .gltf .glb .obj .ply .stl .off
+#
+# Writes out/demo/: the .lsp file, exact.png, approx.png, difference.png and report.html. Renders through Vulkan
+# (lavapipe where there is no GPU), on the CPU where there is no Vulkan device at all.
+set -euo pipefail
+case "${1:-}" in
+  -h | --help) sed -n '2,8s/^# \{0,1\}//p' "$0"; exit 0 ;;
+  -*) echo "demo.sh: unknown option $1, see --help" >&2; exit 1 ;;
+esac
+meshes=()
+for mesh in "$@"; do
+  if [ ! -r "$mesh" ]; then
+    echo "demo.sh: $mesh: cannot be read; check the path" >&2
+    exit 2
+  fi
+  meshes+=("$(realpath "$mesh")")
+done
+cd "$(dirname "$0")/.."
+say() { printf '\n== %s\n' "$*"; }
+
+./samples/setup.sh
+
+say "building"
+launcher=()
+if command -v ccache >/dev/null; then
+  launcher=(-DCMAKE_C_COMPILER_LAUNCHER=ccache -DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
+fi
+build=build/release
+cmake --preset release "${launcher[@]}" >/dev/null
+cmake --build --preset release --target \
+  lsp-sample-scene lsp-bake lsp-validate lsp-render lsp-compare lsp-demo-report
+bin=$PWD/$build/bin
+
+out=out/demo
+mkdir -p "$out"
+view=()
+if [ ${#meshes[@]} -eq 0 ]; then
+  say "making the scene"
+  "$bin/lsp-sample-scene" "$out/scene.glb"
+  meshes=("$PWD/$out/scene.glb")
+  title="the atrium"
+  view=(--camera=-8.1,1.35,0.75:3,2.9,-0.35:64)
+else
+  title=$(basename "${meshes[0]}")
+fi
+
+say "baking"
+"$bin/lsp-bake" "${meshes[@]}" -o "$out/scene.lsp" --resolution 4 --depth 9 --json >"$out/bake.json"
+
+say "validating"
+started=$(date +%s.%N)
+"$bin/lsp-validate" "$out/scene.lsp"
+validated=$(date +%s.%N)
+seconds=$(awk "BEGIN { printf \"%.3f\", $validated - $started }")
+echo "valid, $seconds s"
+
+render() { # render NAME MODE BACKEND
+  "$bin/lsp-render" "$out/scene.lsp" -o "$out/$1.png" -o "$out/$1.pfm" --mode "$2" --backend "$3" \
+    --size 640x360 --samples 8 --denoise "${view[@]}" --json >"$out/$1.json"
+}
+
+say "rendering indirect light, exact and approximate"
+backend=vulkan
+if ! render exact exact vulkan; then
+  echo "demo.sh: no Vulkan device can be used (see above): rendering on the CPU instead"
+  backend=cpu
+  render exact exact cpu
+fi
+render approx approximate "$backend"
+"$bin/lsp-compare" "$out/exact.pfm" "$out/approx.pfm" -o "$out/difference.png" --factor 4 --json >"$out/compare.json"
+
+say "result"
+"$bin/lsp-demo-report" "$out" -o "$out/report.html" --title "$title" --validate-seconds "$seconds"

@@ -1,0 +1,69 @@
+// lsp-demo-report: one self-contained HTML page about a bake and two renderings of it, for samples/demo.sh.
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "../command_line.h"
+#include "../output_file.h"
+#include "page.h"
+
+namespace lsp::sample {
+namespace {
+
+std::string read_file(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream bytes;
+  bytes << file.rdbuf();
+  if (!file) throw Failure(Exit::kFile, path, "cannot be read; run samples/demo.sh, which writes it");
+  return bytes.str();
+}
+
+nlohmann::json read_json(const std::string& path) {
+  const nlohmann::json json = nlohmann::json::parse(read_file(path), nullptr, false);
+  if (json.is_discarded()) throw Failure(Exit::kInvalid, path, "is not JSON; run samples/demo.sh again");
+  return json;
+}
+
+}  // namespace
+}  // namespace lsp::sample
+
+int main(int argc, char** argv) {
+  using namespace lsp;
+  using namespace lsp::sample;
+  constexpr const char* kProgram = "lsp-demo-report";
+  CLI::App app("Writes the demo's page from the figures and pictures in a folder.", kProgram);
+  CommonOptions common;
+  std::string folder;
+  std::string output;
+  std::string title = "scene";
+  double validate_seconds = 0;
+  add_common_options(app, kProgram, common);
+  app.add_option("FOLDER", folder, "With bake.json, exact.json, approx.json, compare.json and the pictures")
+      ->required();
+  app.add_option("-o,--output", output, "The page")->required();
+  app.add_option("--title", title, "What was baked");
+  app.add_option("--validate-seconds", validate_seconds, "Time of lsp-validate");
+  return run_program(kProgram, app, argc, argv, [&] {
+    try {
+      const Figures figures{title,
+                            validate_seconds,
+                            read_json(folder + "/bake.json"),
+                            read_json(folder + "/exact.json"),
+                            read_json(folder + "/approx.json"),
+                            read_json(folder + "/compare.json")};
+      const Pictures pictures{read_file(folder + "/exact.png"), read_file(folder + "/approx.png"),
+                              read_file(folder + "/difference.png")};
+      write_file(output, make_page(figures, pictures));
+      if (common.json) {
+        std::cout << nlohmann::json{{"report", output}}.dump() << "\n";
+      } else if (!common.quiet) {
+        std::cout << make_summary(figures) << "report: " << output << "\n";
+      }
+    } catch (const nlohmann::json::exception& e) {
+      throw Failure(Exit::kInvalid, folder,
+                    std::string("a figure is missing: ") + e.what() + "; run samples/demo.sh again");
+    }
+  });
+}

@@ -1,0 +1,36 @@
+// The demo's page and its summary in plain text.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+
+namespace lsp::sample {
+
+// What the programs printed with --json. Functions below throw nlohmann::json::exception where a figure is
+// missing.
+struct Figures {
+  std::string title;
+  double validate_seconds = 0;
+  nlohmann::json bake;
+  nlohmann::json exact;
+  nlohmann::json approximate;
+  nlohmann::json compare;
+};
+
+// PNG files' bytes.
+struct Pictures {
+  std::string exact;
+  std::string approximate;
+  std::string difference;
+};
+
+std::string base64(std::string_view bytes);
+std::string escape_html(std::string_view text);
+
+// A page that needs no other file and no network.
+std::string make_page(const Figures& figures, const Pictures& pictures);
+// The same figures in a few lines.
+std::string make_summary(const Figures& figures);
+
+}  // namespace lsp::sample
