@@ -1,0 +1,85 @@
+// The demo's page stands alone and holds the figures it is given.
+#include "page.h"
+
+#include <gtest/gtest.h>
+
+namespace lsp::sample {
+namespace {
+
+Figures example() {
+  const nlohmann::json bake = {{"triangles", {{"read", 12}, {"kept", 10}}},
+                               {"notes", {"a <note>"}},
+                               {"skipped", {"empty shafts: 5 of 9"}},
+                               {"line_spaces", 3},
+                               {"shafts", 9},
+                               {"filled_shafts", 4},
+                               {"seconds", {{"import", 0.5}, {"write", 0.25}}},
+                               {"peak_memory_bytes", 2e6},
+                               {"file_bytes", 4e6},
+                               {"sections", {{{"name", "NODE"}, {"bytes", 1e6}, {"stored_bytes", 1e6}}}}};
+  nlohmann::json render = {{"device", "a device"},
+                           {"backend", "cpu"},
+                           {"load_path", "mapped"},
+                           {"width", 4},
+                           {"height", 2},
+                           {"samples", 8},
+                           {"denoised", true},
+                           {"seconds", 2.0},
+                           {"primary_seconds", 0.5},
+                           {"shadow_seconds", 0.5},
+                           {"indirect_seconds", 1.0},
+                           {"indirect_rays", 2000000},
+                           {"indirect_mrays_per_second", 2.0},
+                           {"mean_luminance", 0.25}};
+  nlohmann::json approximate = render;
+  approximate["indirect_mrays_per_second"] = 3.0;
+  const nlohmann::json compare = {{"psnr_db", nullptr},
+                                  {"factor", 4},
+                                  {"rmse", 0.0},
+                                  {"relative_mean", 0.0},
+                                  {"pixels_over_5_percent", 0.0}};
+  return {"a <scene>", 0.125, bake, render, approximate, compare};
+}
+
+TEST(Page, Base64) {
+  EXPECT_EQ(base64(""), "");
+  EXPECT_EQ(base64("f"), "Zg==");
+  EXPECT_EQ(base64("fo"), "Zm8=");
+  EXPECT_EQ(base64("foo"), "Zm9v");
+  EXPECT_EQ(base64("foobar"), "Zm9vYmFy");
+  EXPECT_EQ(base64(std::string("\xff\xfe\xfd", 3)), "//79");
+}
+
+TEST(Page, StandsAlone) {
+  const std::string page = make_page(example(), {"one", "two", "three"});
+  for (const char* outside : {"http:", "https:", "src=\"/", "<link", "url("}) {
+    EXPECT_EQ(page.find(outside), std::string::npos) << outside;
+  }
+  EXPECT_NE(page.find("data:image/png;base64," + base64("three")), std::string::npos);
+}
+
+TEST(Page, EscapesWhatComesFromFiles) {
+  const std::string page = make_page(example(), {});
+  EXPECT_EQ(page.find("<scene>"), std::string::npos);
+  EXPECT_NE(page.find("a &lt;scene&gt;"), std::string::npos);
+  EXPECT_NE(page.find("a &lt;note&gt;"), std::string::npos);
+}
+
+TEST(Page, SaysTheFigures) {
+  const std::string page = make_page(example(), {});
+  EXPECT_NE(page.find("1.50 times"), std::string::npos);
+  EXPECT_NE(page.find("empty shafts: 5 of 9"), std::string::npos);
+  EXPECT_NE(page.find("equal pictures"), std::string::npos);
+  const std::string summary = make_summary(example());
+  EXPECT_NE(summary.find("1.50 times"), std::string::npos);
+  EXPECT_NE(summary.find("skipped:     empty shafts"), std::string::npos);
+}
+
+TEST(Page, MissingFigureIsReported) {
+  Figures figures = example();
+  figures.bake.erase("shafts");
+  EXPECT_THROW(make_page(figures, {}), nlohmann::json::exception);
+}
+
+}  // namespace
+}  // namespace lsp::sample

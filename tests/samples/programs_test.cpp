@@ -1,0 +1,152 @@
+// The sample programs as a user runs them: scene, bake, render, compare.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <sstream>
+
+#include "compare.h"
+#include "lsp/vulkan_device.hpp"
+
+namespace lsp::sample {
+namespace {
+
+// Runs a program of the build with its output in files; returns its exit code.
+int run(const std::string& command) {
+  const int status = std::system((std::string(LSP_BIN_DIR) + "/" + command).c_str());
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+std::string read(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream bytes;
+  bytes << file.rdbuf();
+  return bytes.str();
+}
+
+// A folder with a small baked scene, made once.
+class Programs : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = std::filesystem::temp_directory_path() / ("lsp_samples_" + std::to_string(::getpid()));
+    std::filesystem::create_directories(folder_);
+    for (const char* scene : {"spheres", "plane"}) {
+      ASSERT_EQ(run("lsp-sample-scene " + file(scene) + ".glb --quiet --triangles 8000 --scene " + scene), 0);
+      ASSERT_EQ(
+          run("lsp-bake " + file(scene) + ".glb -o " + file(scene) + ".lsp --quiet --resolution 4 --depth 6"),
+          0);
+      ASSERT_EQ(run("lsp-validate " + file(scene) + ".lsp"), 0);
+    }
+  }
+  static void TearDownTestSuite() { std::filesystem::remove_all(folder_); }
+
+  static std::string file(const std::string& name) { return (folder_ / name).string(); }
+
+  // Renders `scene` into NAME.pfm and reads it back.
+  static Picture render(const std::string& scene, const std::string& name, const std::string& options) {
+    EXPECT_EQ(run("lsp-render " + file(scene) + ".lsp -o " + file(name) +
+                  ".pfm --quiet --size 64x36 --samples 4 " + options),
+              0);
+    return read_pfm(file(name) + ".pfm");
+  }
+
+  static std::filesystem::path folder_;
+};
+
+std::filesystem::path Programs::folder_;
+
+TEST_F(Programs, PictureDoesNotDependOnThreads) {
+  for (const char* mode : {"exact", "approximate"}) {
+    const std::string options = std::string("--bounces 2 --denoise --mode ") + mode;
+    render("spheres", "one", options + " --threads 1");
+    render("spheres", "three", options + " --threads 3");
+    EXPECT_EQ(read(file("one.pfm")), read(file("three.pfm"))) << mode;
+  }
+}
+
+TEST_F(Programs, AllIsTheSumOfItsParts) {
+  const Picture direct = render("spheres", "direct", "--effect direct");
+  const Picture diffuse = render("spheres", "diffuse", "--effect diffuse");
+  const Picture glossy = render("spheres", "glossy", "--effect glossy");
+  const Picture all = render("spheres", "all", "--effect all");
+  for (size_t i = 0; i < all.pixels.size(); ++i) {
+    const glm::vec3 sum = direct.pixels[i] + diffuse.pixels[i] + glossy.pixels[i];
+    for (int c = 0; c < 3; ++c) ASSERT_NEAR(all.pixels[i][c], sum[c], 1e-4f + 1e-4f * sum[c]);
+  }
+}
+
+TEST_F(Programs, OpenPlaneIsNearlyUnoccluded) {
+  // The plane rolls by 8 cm: hardly anything is in the way of a ray.
+  const Picture ao = render("plane", "ao", "--effect ao");
+  double sum = 0;
+  for (const glm::vec3& p : ao.pixels) sum += static_cast<double>(p.x);
+  EXPECT_GT(sum / static_cast<double>(ao.pixels.size()), 0.97);
+}
+
+TEST_F(Programs, ApproximateIsCloseAndPrimaryRaysAreExact) {
+  const Comparison direct = compare(render("spheres", "a", "--effect direct"),
+                                    render("spheres", "b", "--effect direct --mode approximate"));
+  EXPECT_EQ(direct.mean_absolute, 0.0) << "direct light is exact in both modes";
+  const Comparison all = compare(render("spheres", "a", "--effect all --samples 16"),
+                                 render("spheres", "b", "--effect all --samples 16 --mode approximate"));
+  EXPECT_GT(all.psnr_db, 25.0);
+  EXPECT_NEAR(all.mean_test / all.mean_reference, 1.0, 0.02);
+}
+
+TEST_F(Programs, VulkanGivesTheSamePicture) {
+  std::string why;
+  if (!VulkanTracer::available(&why)) GTEST_SKIP() << "no Vulkan device: " << why;
+  for (const char* mode : {"exact", "approximate"}) {
+    render("spheres", "cpu", std::string("--mode ") + mode);
+    render("spheres", "vulkan", std::string("--backend vulkan --mode ") + mode);
+    EXPECT_EQ(read(file("cpu.pfm")), read(file("vulkan.pfm"))) << mode;
+  }
+}
+
+TEST_F(Programs, CompareExitsWith7WhereTheyDiffer) {
+  render("spheres", "a", "--effect direct");
+  render("spheres", "b", "--effect ao");
+  EXPECT_EQ(run("lsp-compare --quiet --max-rmse 0 " + file("a.pfm") + " " + file("a.pfm")), 0);
+  EXPECT_EQ(run("lsp-compare --quiet --max-rmse 0 " + file("a.pfm") + " " + file("b.pfm") + " 2>/dev/null"),
+            7);
+}
+
+TEST_F(Programs, HelloTracesARay) {
+  ASSERT_EQ(run("hello " + file("plane.lsp") + " > " + file("hello.txt")), 0);
+  EXPECT_EQ(read(file("hello.txt")).rfind("hit triangle", 0), 0u) << read(file("hello.txt"));
+}
+
+TEST_F(Programs, ExitCodes) {
+  const std::string quiet = " >/dev/null 2>&1";
+  const std::string scene = file("spheres.lsp");
+  for (const char* program : {"lsp-render", "lsp-compare", "lsp-sample-scene"}) {
+    EXPECT_EQ(run(program + std::string(" --help") + quiet), 0) << program;
+    EXPECT_EQ(run(program + std::string(" --version") + quiet), 0) << program;
+    EXPECT_EQ(run(program + std::string(" --no-such-option") + quiet), 1) << program;
+  }
+  EXPECT_EQ(run("lsp-render " + scene + " -o " + file("x.jpeg") + quiet), 1);
+  EXPECT_EQ(run("lsp-render " + scene + " -o " + file("x.png") + " --camera 1,2,3" + quiet), 1);
+  EXPECT_EQ(run("lsp-render " + scene + " -o " + file("x.png") + " --size 0x7" + quiet), 1);
+  EXPECT_EQ(run("lsp-render " + file("missing.lsp") + " -o " + file("x.png") + quiet), 2);
+  EXPECT_EQ(run("lsp-render " + scene + " -o /nonexistent/x.png --size 8x8 --samples 1" + quiet), 2);
+  EXPECT_EQ(run("lsp-render " + file("plane.glb") + " -o " + file("x.png") + quiet), 3);
+  EXPECT_EQ(run("lsp-bake " + file("plane.glb") + " -o " + file("plain.lsp") + " --quiet --no-line-spaces"),
+            0);
+  EXPECT_EQ(run("lsp-render " + file("plain.lsp") + " -o " + file("x.png") + " --mode approximate" + quiet),
+            5);
+  EXPECT_FALSE(std::filesystem::exists(file("x.png")));
+}
+
+TEST_F(Programs, PackedFilesRenderTheSame) {
+  ASSERT_EQ(run("lsp-bake " + file("spheres.glb") + " -o " + file("packed.lsp") +
+                " --quiet --resolution 4 --depth 6 --compress zstd"),
+            0);
+  render("spheres", "raw", "--mode approximate");
+  render("packed", "unpacked", "--mode approximate");
+  EXPECT_EQ(read(file("raw.pfm")), read(file("unpacked.pfm")));
+}
+
+}  // namespace
+}  // namespace lsp::sample
