@@ -15,6 +15,7 @@ class Budget {
 
   // Throws Failure kLimit, naming `file`, where count * bytes_each more would pass the limit.
   void charge(const std::string& file, uint64_t count, uint64_t bytes_each = 1);
+  uint64_t left() const { return limit_ - used_; }
   void release(uint64_t bytes) { used_ -= bytes < used_ ? bytes : used_; }
 
  private:

@@ -84,6 +84,7 @@ class GltfReader {
 
   void read() {
     const std::vector<int> roots = find_roots();
+    decode_all_draco();
     check_scene(roots);
     for (const int root : roots) walk(root);
     if (skipped_modes_) {
@@ -215,9 +216,8 @@ class GltfReader {
               indices = attribute(kGltfIndices);
     Primitive out;
     out.material = source.material >= 0 ? uint32_t(source.material) : kNoIndex;
-    const auto draco = source.extensions.find("KHR_draco_mesh_compression");
-    if (draco != source.extensions.end()) {
-      read_draco(draco->second, position, normal, out);
+    if (source.extensions.contains("KHR_draco_mesh_compression")) {
+      read_draco(source, position, normal, out);
     } else {
       out.positions = vectors_of(accessors_.floats(position, 3));
       if (normal >= 0) out.normals = vectors_of(accessors_.floats(normal, 3));
@@ -262,7 +262,31 @@ class GltfReader {
     primitive.normals = std::move(kept.normals);
   }
 
-  void read_draco(const tinygltf::Value& extension, int position, int normal, Primitive& out) {
+  // Draco's primitives of all meshes that nodes place, decoded in one go.
+  void decode_all_draco() {
+    std::vector<bool> placed(model_.meshes.size(), false);
+    for (const tinygltf::Node& node : model_.nodes) {
+      if (node.mesh >= 0 && size_t(node.mesh) < placed.size()) placed[size_t(node.mesh)] = true;
+    }
+    std::vector<DracoJob> jobs;
+    std::vector<const tinygltf::Primitive*> sources;
+    for (size_t mesh = 0; mesh < placed.size(); ++mesh) {
+      if (!placed[mesh]) continue;
+      for (const tinygltf::Primitive& source : model_.meshes[mesh].primitives) {
+        if (!source.extensions.contains("KHR_draco_mesh_compression") ||
+            !source.attributes.contains("POSITION"))
+          continue;
+        jobs.push_back(draco_job(source));
+        sources.push_back(&source);
+      }
+    }
+    if (jobs.empty()) return;
+    std::vector<DracoMesh> meshes = decode_draco_fenced(document_->file, jobs, builder_.budget());
+    for (size_t i = 0; i < sources.size(); ++i) draco_.emplace(sources[i], std::move(meshes[i]));
+  }
+
+  DracoJob draco_job(const tinygltf::Primitive& source) {
+    const tinygltf::Value& extension = source.extensions.at("KHR_draco_mesh_compression");
     const auto id = [&](const char* name) {
       if (!extension.IsObject() || !extension.Get("attributes").IsObject()) return -1;
       const tinygltf::Value& value = extension.Get("attributes").Get(name);
@@ -272,12 +296,23 @@ class GltfReader {
     const tinygltf::Value& view = extension.IsObject() ? extension.Get("bufferView") : none;
     if (!view.IsInt() || id("POSITION") < 0)
       fail("has KHR_draco_mesh_compression without a buffer view or positions");
-    const bool has_normals = normal >= 0 && id("NORMAL") >= 0;
-    DracoMesh mesh = decode_draco(document_->file, accessors_.view(view.Get<int>()), id("POSITION"),
-                                  accessors_.at(position).normalized, has_normals ? id("NORMAL") : -1,
-                                  has_normals && accessors_.at(normal).normalized, builder_.budget());
+    DracoJob job{accessors_.view(view.Get<int>()), id("POSITION"),
+                 accessors_.at(source.attributes.at("POSITION")).normalized};
+    const auto normal = source.attributes.find("NORMAL");
+    if (normal != source.attributes.end() && id("NORMAL") >= 0) {
+      job.normal_id = id("NORMAL");
+      job.normal_normalized = accessors_.at(normal->second).normalized;
+    }
+    return job;
+  }
+
+  void read_draco(const tinygltf::Primitive& source, int position, int normal, Primitive& out) {
+    const auto found = draco_.find(&source);
+    if (found == draco_.end()) fail("has a compressed primitive that no node places");
+    DracoMesh mesh = std::move(found->second);
+    draco_.erase(found);
     accessors_.overlay_sparse(accessors_.at(position), 3, mesh.positions);
-    if (has_normals) accessors_.overlay_sparse(accessors_.at(normal), 3, mesh.normals);
+    if (!mesh.normals.empty()) accessors_.overlay_sparse(accessors_.at(normal), 3, mesh.normals);
     out.positions = vectors_of(mesh.positions);
     out.normals = vectors_of(mesh.normals);
     out.indices = std::move(mesh.indices);
@@ -425,7 +460,8 @@ class GltfReader {
   GltfAccessors accessors_;
   std::map<int, std::vector<Primitive>> meshes_;
   std::map<uint32_t, uint32_t> materials_;
-  std::vector<Extent> extents_;  // of each node with what hangs below it
+  std::map<const tinygltf::Primitive*, DracoMesh> draco_;  // decoded, and not yet part of meshes_
+  std::vector<Extent> extents_;                            // of each node with what hangs below it
   std::vector<glm::vec3> placed_, turned_;
   uint64_t skipped_modes_ = 0, without_positions_ = 0;
 };

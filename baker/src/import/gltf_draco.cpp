@@ -49,13 +49,12 @@ bool read_attribute(const draco::Mesh& mesh, int id, bool normalized, std::vecto
 
 }  // namespace
 
-DracoMesh decode_draco(const std::string& file, Bytes bytes, int position_id, bool position_normalized,
-                       int normal_id, bool normal_normalized, Budget& budget) {
+DracoMesh decode_draco(const std::string& file, const DracoJob& job, Budget& budget) {
   const auto fail = [&](const std::string& what) -> Failure {
     return {Exit::kInvalid, file, "has KHR_draco_mesh_compression data that " + what + ", export it again"};
   };
   draco::DecoderBuffer buffer;
-  buffer.Init(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  buffer.Init(reinterpret_cast<const char*>(job.bytes.data()), job.bytes.size());
   draco::Decoder decoder;
   auto decoded = decoder.DecodeMeshFromBuffer(&buffer);
   if (!decoded.ok()) throw fail("is damaged (" + printable(decoded.status().error_msg_string()) + ")");
@@ -69,10 +68,11 @@ DracoMesh decode_draco(const std::string& file, Bytes bytes, int position_id, bo
     const draco::Mesh::Face& face = mesh->face(draco::FaceIndex(i));
     for (int k = 0; k < 3; ++k) out.indices.push_back(face[size_t(k)].value());
   }
-  if (position_id >= 0 && !read_attribute(*mesh, position_id, position_normalized, out.positions)) {
+  if (job.position_id >= 0 &&
+      !read_attribute(*mesh, job.position_id, job.position_normalized, out.positions)) {
     throw fail("lacks the positions");
   }
-  if (normal_id >= 0 && !read_attribute(*mesh, normal_id, normal_normalized, out.normals))
+  if (job.normal_id >= 0 && !read_attribute(*mesh, job.normal_id, job.normal_normalized, out.normals))
     throw fail("lacks the normals");
   return out;
 }
