@@ -1,0 +1,265 @@
+#include "summary.h"
+
+#include <lsp/program.h>
+
+#include <cstdarg>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "fields.h"
+#include "layers.h"
+#include "line_space.h"
+
+namespace lsp::format {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json feature_names(uint32_t features) {
+  static constexpr struct {
+    uint32_t bit;
+    const char* name;
+  } kNames[] = {{LSP_FEATURE_EXACT, "exact"},     {LSP_FEATURE_LINE_SPACES, "line spaces"},
+                {LSP_FEATURE_NORMALS, "normals"}, {LSP_FEATURE_MATERIALS, "materials"},
+                {LSP_FEATURE_NTREE, "ntree"},     {LSP_FEATURE_BINARY, "binary"}};
+  Json names = Json::array();
+  for (const auto& feature : kNames)
+    if (features & feature.bit) names.push_back(feature.name);
+  return names;
+}
+
+Json sections(const FileView& view) {
+  Json list = Json::array();
+  for (const LspSection& entry : view.table) {
+    const int kind = kind_of(entry.type);
+    list.push_back({{"name", type_name(entry.type)},
+                    {"offset", entry.offset},
+                    {"stored_bytes", entry.stored_bytes},
+                    {"bytes", entry.bytes},
+                    {"codec", entry.codec == LSP_CODEC_NONE   ? Json("none")
+                              : entry.codec == LSP_CODEC_ZSTD ? Json("zstd")
+                                                              : Json(entry.codec)},
+                    {"element_bytes", entry.element_bytes},
+                    {"element_count", entry.element_count},
+                    {"required", (entry.flags & LSP_SECTION_REQUIRED) != 0},
+                    {"readable", kind != kKinds && view.parts[kind].usable},
+                    {"hash", to_hex({entry.hash_lo, entry.hash_hi})}});
+  }
+  return list;
+}
+
+// One row a depth: what begins there.
+struct Row {
+  uint64_t nodes = 0, leaves = 0, triangles = 0, line_spaces = 0, shafts = 0, filled = 0;
+};
+
+class DepthTable {
+ public:
+  explicit DepthTable(const FileView& view)
+      : nodes_(view.elements<LspNode>(Kind::kNode)),
+        spaces_(view.elements<LspLineSpace>(Kind::kLspc)),
+        header_(view.header) {}
+
+  std::vector<Row> run() {
+    depth_.assign(nodes_.size(), kUnseen);
+    child(header_.root, header_.root_line_space, 0, 0);
+    for (uint64_t i = 0; i < nodes_.size(); ++i) {
+      if (depth_[i] == kUnseen) continue;
+      child(nodes_[i].child0, nodes_[i].line_space0, depth_[i] + 1, i);
+      child(nodes_[i].child1, nodes_[i].line_space1, depth_[i] + 1, i);
+    }
+    return std::move(rows_);
+  }
+
+ private:
+  static constexpr uint32_t kUnseen = LSP_NONE;
+  static constexpr uint32_t kMaxRows = 256;  // a damaged file may claim a chain of any length
+
+  void child(uint32_t reference, uint32_t line_space, uint32_t depth, uint64_t parent) {
+    if (depth >= kMaxRows) return;
+    if (rows_.size() <= depth) rows_.resize(depth + 1);
+    Row& row = rows_[depth];
+    const uint32_t index = line_space & LSP_LINE_SPACE_MASK;
+    if (line_space != LSP_NONE && index < spaces_.size()) {
+      ++row.line_spaces;
+      row.shafts += shape_of(spaces_[index].format).shafts;
+      row.filled += spaces_[index].filled;
+    }
+    if (reference == LSP_NONE) return;
+    if (reference & LSP_LEAF_BIT) {
+      ++row.leaves;
+      row.triangles += (reference >> LSP_LEAF_COUNT_SHIFT & LSP_LEAF_COUNT_MASK) + 1;
+    } else if (reference < nodes_.size() && (reference > parent || (reference == 0 && depth == 0)) &&
+               depth_[reference] == kUnseen) {
+      ++row.nodes;
+      depth_[reference] = depth;
+    }
+  }
+
+  std::span<const LspNode> nodes_;
+  std::span<const LspLineSpace> spaces_;
+  const LspHeader& header_;
+  std::vector<uint32_t> depth_;
+  std::vector<Row> rows_;
+};
+
+double ratio(uint64_t part, uint64_t whole) {
+  return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
+}
+
+Json line_spaces(const FileView& view) {
+  uint64_t shafts = 0, filled = 0, dense = 0, binary = 0, words = 0, candidate_words = 0;
+  for (const LspLineSpace& space : view.elements<LspLineSpace>(Kind::kLspc)) {
+    const LineSpaceShape shape = shape_of(space.format);
+    shafts += shape.shafts;
+    filled += space.filled;
+    dense += shape.dense;
+    binary += shape.entry_bytes == 0;
+    words += shape.words;
+    candidate_words += shape.candidate_words(space.filled);
+  }
+  return {{"count", view.elements<LspLineSpace>(Kind::kLspc).size()},
+          {"dense", dense},
+          {"binary", binary},
+          {"shafts", shafts},
+          {"filled", filled},
+          {"fill_rate", ratio(filled, shafts)},
+          {"bit_bytes", words * sizeof(LspBitWord)},
+          {"candidate_bytes", candidate_words * 4},
+          {"bytes_per_filled_shaft", ratio(words * sizeof(LspBitWord) + candidate_words * 4, filled)}};
+}
+
+Json vec(const lsp_float3& v) { return Json::array({v.x, v.y, v.z}); }
+
+std::string line(const char* format, ...) __attribute__((format(printf, 1, 2)));
+std::string line(const char* format, ...) {
+  char text[256];
+  va_list arguments;
+  va_start(arguments, format);
+  std::vsnprintf(text, sizeof text, format, arguments);
+  va_end(arguments);
+  return text;
+}
+
+std::string section_line(const Json& s) {
+  return line("  %-8s %12llu %12llu %12llu  %-5s %5u x %llu\n", s["name"].get<std::string>().c_str(),
+              s["offset"].get<unsigned long long>(), s["stored_bytes"].get<unsigned long long>(),
+              s["bytes"].get<unsigned long long>(),
+              s["codec"].is_string() ? s["codec"].get<std::string>().c_str() : "?",
+              s["element_bytes"].get<unsigned>(), s["element_count"].get<unsigned long long>());
+}
+
+}  // namespace
+
+Json summarize(std::span<const std::byte> file, const std::string& name, uint64_t memory_limit) {
+  FileView view = view_file(file);
+  Report report;
+  check_identification(view, report);
+  if (report.verdict() == Verdict::kUnsupported)
+    throw Failure(Exit::kUnsupported, name,
+                  "has a version or features that this program does not know: use a newer one");
+  if (report.fatal()) throw Failure(Exit::kInvalid, name, "is not an .lsp file");
+  check_sections(view, report);
+  check_hashes_and_codec(view, memory_limit, report);
+
+  const LspHeader& header = view.header;
+  Json json;
+  json["program"] = "lsp-info";
+  json["version"] = kProgramVersion;
+  json["file"] = name;
+  json["bytes"] = file.size();
+  json["format"] = std::to_string(header.version_major) + "." + std::to_string(header.version_minor);
+  json["content_id"] = to_hex({header.content_hash_lo, header.content_hash_hi});
+  json["source_id"] = to_hex({header.source_hash_lo, header.source_hash_hi});
+  json["features"] = feature_names(header.required_features);
+  json["base"] = header.base_structure == LSP_BASE_NTREE ? "ntree" : "bvh";
+  json["packed"] = view.any_packed();
+  json["parameters"] = {
+      {"resolution", header.resolution},           {"depth", header.line_space_depth},
+      {"triangles", header.line_space_triangles},  {"normal_angle_cos", header.normal_angle_cos},
+      {"plane_tolerance", header.plane_tolerance}, {"alignment", header.alignment},
+      {"ntree_branching", header.ntree_branching}, {"ntree_depth", header.ntree_depth}};
+  json["bounds"] = {{"min", vec(header.bounds_min)}, {"max", vec(header.bounds_max)}};
+  json["counts"] = {{"primitives", header.primitive_count}, {"triangles", header.triangle_count},
+                    {"nodes", header.node_count},           {"line_spaces", header.line_space_count},
+                    {"bit_words", header.bit_word_count},   {"candidate_words", header.candidate_word_count},
+                    {"materials", header.material_count}};
+  json["limits"] = {{"max_depth", header.max_depth},
+                    {"max_stack", header.max_stack},
+                    {"max_steps", header.max_steps},
+                    {"max_leaf_triangles", header.max_leaf_triangles}};
+  json["sections"] = sections(view);
+  uint64_t stored = 0;
+  for (const LspSection& entry : view.table)
+    if (in_range(entry.offset, entry.stored_bytes, file.size())) stored += entry.stored_bytes;
+  const uint64_t head = sizeof(LspHeader) + view.table.size() * sizeof(LspSection);
+  json["padding_bytes"] = file.size() > stored + head ? file.size() - stored - head : 0;
+  json["line_spaces"] = line_spaces(view);
+  json["depths"] = Json::array();
+  uint64_t depth = 0;
+  for (const Row& row : DepthTable(view).run())
+    json["depths"].push_back({{"depth", depth++},
+                              {"nodes", row.nodes},
+                              {"leaves", row.leaves},
+                              {"triangles", row.triangles},
+                              {"line_spaces", row.line_spaces},
+                              {"fill_rate", ratio(row.filled, row.shafts)}});
+  if (const Part& meta = view.part(Kind::kMeta); meta.usable && !report.has(RuleId::kSectionHash)) {
+    const auto* text = reinterpret_cast<const char*>(meta.data.data());
+    Json provenance = Json::parse(text, text + meta.data.size(), nullptr, false);
+    if (!provenance.is_discarded()) json["provenance"] = std::move(provenance);
+  }
+  json["findings"] = report.count(Severity::kError) + report.count(Severity::kFatal);
+  return json;
+}
+
+std::string summary_text(const Json& j, const std::string& section) {
+  std::string text;
+  const std::string head = "  section        offset       stored        bytes  codec   elements\n";
+  if (!section.empty()) {
+    for (const Json& s : j["sections"])
+      if (s["name"] == section)
+        return head + section_line(s) + "  hash " + s["hash"].get<std::string>() + "\n";
+    throw Failure(Exit::kUsage, j["file"], "has no section " + section);
+  }
+  text += line("%s: format %s, %llu bytes%s\n", j["file"].get<std::string>().c_str(),
+               j["format"].get<std::string>().c_str(), j["bytes"].get<unsigned long long>(),
+               j["packed"].get<bool>() ? ", packed" : "");
+  text += "content " + j["content_id"].get<std::string>() + "\n";
+  std::string features;
+  for (const Json& feature : j["features"])
+    features += (features.empty() ? "" : ", ") + feature.get<std::string>();
+  text += "base " + j["base"].get<std::string>() + "; features: " + features + "\n";
+  const Json& p = j["parameters"];
+  text += line("parameters N %u, D %u, T %u; plane tolerance %g, normal angle cosine %g, alignment %u\n",
+               p["resolution"].get<unsigned>(), p["depth"].get<unsigned>(), p["triangles"].get<unsigned>(),
+               p["plane_tolerance"].is_number() ? p["plane_tolerance"].get<double>() : 0.0,
+               p["normal_angle_cos"].is_number() ? p["normal_angle_cos"].get<double>() : 0.0,
+               p["alignment"].get<unsigned>());
+  const Json& c = j["counts"];
+  text += line("%llu primitives, %llu triangles, %llu nodes, %llu Line Spaces, %llu materials\n",
+               c["primitives"].get<unsigned long long>(), c["triangles"].get<unsigned long long>(),
+               c["nodes"].get<unsigned long long>(), c["line_spaces"].get<unsigned long long>(),
+               c["materials"].get<unsigned long long>());
+  text += "\n" + head;
+  for (const Json& s : j["sections"]) text += section_line(s);
+  text += line("  padding %25llu\n", j["padding_bytes"].get<unsigned long long>());
+  const Json& l = j["line_spaces"];
+  if (l["count"] != 0)
+    text += line(
+        "\n%llu of %llu shafts filled (%.2f %%), %.2f bytes a filled shaft; %llu dense, %llu binary Line "
+        "Spaces\n",
+        l["filled"].get<unsigned long long>(), l["shafts"].get<unsigned long long>(),
+        100 * l["fill_rate"].get<double>(), l["bytes_per_filled_shaft"].get<double>(),
+        l["dense"].get<unsigned long long>(), l["binary"].get<unsigned long long>());
+  text += "\n  depth      nodes     leaves  triangles  Line Spaces  filled\n";
+  for (const Json& d : j["depths"])
+    text += line("  %5llu %10llu %10llu %10llu %12llu  %5.1f %%\n", d["depth"].get<unsigned long long>(),
+                 d["nodes"].get<unsigned long long>(), d["leaves"].get<unsigned long long>(),
+                 d["triangles"].get<unsigned long long>(), d["line_spaces"].get<unsigned long long>(),
+                 100 * d["fill_rate"].get<double>());
+  if (j["findings"] != 0) text += "\nThis file is damaged: run lsp-validate.\n";
+  return text;
+}
+
+}  // namespace lsp::format
