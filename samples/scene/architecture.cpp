@@ -33,7 +33,7 @@ Surface fluted_shaft(const Detail& detail, float radius, float from, float to) {
   constexpr int kFlutes = 20;
   const int around = kFlutes * detail.steps(4, 1);
   return tessellate(
-      around, detail.steps(10, 2),
+      around, detail.steps(8, 2),
       [=](float u, float v) {
         const float angle = 2.0f * kPi * u;
         const float ends = smooth(0.0f, 0.06f, v) * smooth(0.0f, 0.06f, 1.0f - v);
@@ -46,7 +46,7 @@ Surface fluted_shaft(const Detail& detail, float radius, float from, float to) {
 
 Surface smooth_shaft(const Detail& detail, float radius, float from, float to) {
   return tessellate(
-      detail.steps(24, 4), detail.steps(10, 2),
+      detail.steps(20, 4), detail.steps(10, 2),
       [=](float u, float v) {
         const float angle = 2.0f * kPi * u;
         const float r = entasis(radius, v);
@@ -69,7 +69,7 @@ Surface attic_base(const Detail& detail, float radius, float height) {
   Profile torus_high;
   arc(torus_high, {radius * 1.09f, plinth + 0.55f * h}, 0.08f * h, -kPi / 2, kPi / 2, steps);
   torus_high.emplace_back(radius, plinth + 0.64f * h);
-  append(base, lathe({torus_low, scotia, torus_high}, detail.steps(24, 4)));
+  append(base, lathe({torus_low, scotia, torus_high}, detail.steps(20, 4)));
   return base;
 }
 
@@ -83,7 +83,7 @@ Surface capital(const Detail& detail, float radius, float height) {
     const float t = static_cast<float>(i) / static_cast<float>(steps);
     bell.emplace_back(radius * (0.98f + 0.42f * t * t * t), h * (0.08f + 0.72f * t));
   }
-  Surface s = lathe({astragal, bell}, detail.steps(24, 4));
+  Surface s = lathe({astragal, bell}, detail.steps(20, 4));
   const float half = radius * 1.45f;
   append(s, box({-half, 0.80f * h, -half}, {half, h, half}));
   append(s, box({-half * 1.08f, 0.92f * h, -half * 1.08f}, {half * 1.08f, h, half * 1.08f}));
@@ -138,7 +138,7 @@ Surface archivolt(const Detail& detail, float radius, float thickness) {
 Surface groin_vault(const Detail& detail, float side) {
   const float r = side / 2;
   Surface vault;
-  const int steps = detail.steps(9, 2);
+  const int steps = detail.steps(8, 2);
   for (int quarter = 0; quarter < 4; ++quarter) {
     Surface severy = tessellate(steps, steps, [=](float u, float v) {
       const float x = r * v;
@@ -197,7 +197,7 @@ Surface coffer_rosettes(const Detail& detail, float side, int per_side) {
   Surface s;
   const float cell = side / static_cast<float>(per_side);
   const float half = cell * 0.32f;
-  Surface one = tessellate(detail.steps(6, 1), detail.steps(6, 1), [=](float u, float v) {
+  Surface one = tessellate(detail.steps(5, 1), detail.steps(5, 1), [=](float u, float v) {
     const glm::vec2 p((2.0f * u - 1.0f), (2.0f * v - 1.0f));
     const float r = glm::length(p);
     const float petals = 0.75f + 0.25f * std::cos(8.0f * std::atan2(p.y, p.x));
@@ -252,7 +252,7 @@ Surface plain_tile(float side) {
 
 Surface relief_tile(const Detail& detail, float side) {
   const float half = side / 2 - 0.004f;
-  const int steps = detail.steps(8, 1);
+  const int steps = detail.steps(7, 1);
   return tessellate(steps, steps, [=](float u, float v) {
     const glm::vec2 p(2.0f * v - 1.0f, 2.0f * u - 1.0f);
     const float edge = std::max(std::abs(p.x), std::abs(p.y));

@@ -522,14 +522,13 @@ class AtriumBuilder {
     for (size_t i = 0; i < 4; ++i) {
       banners[i] = mesh("banner", {{colors[i], banner(detail_, 1.25f, 3.0f, static_cast<int>(i))}});
     }
-    const float face = kCourtZ - kArcade / 2 - 0.36f;
+    const float face = kCourtZ - kArcade / 2 - 0.52f;
     for (int i = 0; i < kBaysX; ++i) {
       const float x = (static_cast<float>(i) + 0.5f) * kBay - kCourtX;
-      if (i % 2 == 1) {
-        place(banners[static_cast<size_t>(i / 2 % 4)], {x, kGallery + 1.0f, -face});
-      } else {
-        place(banners[static_cast<size_t>((i / 2 + 2) % 4)], {x, kGallery + 1.0f, face}, kPi);
-      }
+      const bool north = i % 2 == 1;
+      const glm::vec3 at(x, kGallery + 1.0f, north ? -face : face);
+      place(banners[static_cast<size_t>((i / 2 + (north ? 0 : 2)) % 4)], at, north ? 0.0f : kPi);
+      place(rod_mesh, at, 0.0f, glm::vec3(0.62f, 1.0f, 1.0f));
     }
 
     // Tied curtains in some of the lower arches, one mirrored by turning it about.

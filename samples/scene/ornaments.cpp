@@ -43,7 +43,7 @@ glm::mat4 move(glm::vec3 by) { return glm::translate(glm::mat4(1.0f), by); }
 
 Surface banner(const Detail& detail, float width, float length, int seed) {
   const float phase = kTau * random01(seed, 0);
-  return tessellate(detail.steps(24, 4), detail.steps(36, 4), [=](float u, float v) {
+  return tessellate(detail.steps(20, 4), detail.steps(32, 4), [=](float u, float v) {
     const float x = (u - 0.5f) * width * (1.0f - 0.06f * std::sin(kPi * v));
     const float free = smooth(0.0f, 0.25f, v);
     const float fold = 0.055f * std::sin(kTau * 2.5f * u + phase + 1.3f * v) * (0.35f + 0.65f * free);
@@ -55,7 +55,7 @@ Surface banner(const Detail& detail, float width, float length, int seed) {
 
 Surface tied_curtain(const Detail& detail, float width, float length, int seed) {
   const float phase = kTau * random01(seed, 1);
-  return tessellate(detail.steps(44, 5), detail.steps(30, 4), [=](float u, float v) {
+  return tessellate(detail.steps(36, 5), detail.steps(26, 4), [=](float u, float v) {
     // The cloth spans `width` at the top and is drawn together towards the tie, then falls straight.
     const float tie = 0.60f;
     const float open = v < tie ? 1.0f - smooth(0.0f, 1.0f, std::pow(v / tie, 1.6f)) : 0.0f;
@@ -74,7 +74,7 @@ Surface tied_curtain(const Detail& detail, float width, float length, int seed) 
 
 Surface awning(const Detail& detail, float width, float span, float sag, int seed) {
   const float phase = kTau * random01(seed, 2);
-  return tessellate(detail.steps(64, 6), detail.steps(20, 3), [=](float u, float v) {
+  return tessellate(detail.steps(56, 6), detail.steps(16, 3), [=](float u, float v) {
     const float z = (u - 0.5f) * span;
     const float hang = 1.0f - std::pow(2.0f * u - 1.0f, 2.0f);
     const float x = (v - 0.5f) * width * (1.0f - 0.16f * hang);
@@ -94,7 +94,7 @@ Surface torus_knot(const Detail& detail, int p, int q) {
                      r * std::sin(static_cast<float>(p) * angle));
   };
   return tube(
-      curve, [](float) { return 0.125f; }, detail.steps(220, 18), detail.steps(20, 3), true);
+      curve, [](float) { return 0.125f; }, detail.steps(200, 18), detail.steps(18, 3), true);
 }
 
 Surface gyroid_sphere(const Detail& detail) {
@@ -108,12 +108,12 @@ Surface gyroid_sphere(const Detail& detail) {
     // Smooth intersections, so that rims are rounded.
     return -smooth_min(smooth_min(-sheet, -ball, 0.06f), -hollow, 0.06f);
   };
-  return implicit(field, -1.13f, 1.13f, detail.steps(27, 5));
+  return implicit(field, -1.13f, 1.13f, detail.steps(24, 5));
 }
 
 Surface coral(const Detail& detail) {
   return tessellate(
-      detail.steps(90, 6), detail.steps(48, 4),
+      detail.steps(80, 6), detail.steps(44, 4),
       [](float u, float v) {
         const float around = kTau * u;
         const float up = kPi * (v - 0.5f);
@@ -128,7 +128,7 @@ Surface coral(const Detail& detail) {
 
 Surface twisted_vase(const Detail& detail) {
   return tessellate(
-      detail.steps(64, 8), detail.steps(28, 6),
+      detail.steps(52, 8), detail.steps(26, 6),
       [](float u, float v) {
         // Outside from the foot to the lip for v in [0, 0.6], then down the inside to the bottom.
         const bool outside = v < 0.6f;
@@ -162,7 +162,7 @@ Surface blob_figure(const Detail& detail) {
     const float hole = glm::length(glm::vec2(p.x - 0.03f, p.y + 0.14f)) - 0.12f;
     return -smooth_min(-d, hole, 0.12f);
   };
-  return implicit(field, -1.1f, 1.1f, detail.steps(38, 6));
+  return implicit(field, -1.1f, 1.1f, detail.steps(32, 6));
 }
 
 Surface pedestal(const Detail& detail, float radius, float height) {
@@ -212,7 +212,7 @@ Surface fountain_water(const Detail& detail) {
   Surface s;
   const auto disc = [&](float radius, float height) {
     append(s, tessellate(
-                  detail.steps(72, 8), detail.steps(20, 2),
+                  detail.steps(48, 8), detail.steps(14, 2),
                   [=](float u, float v) {
                     const float r = radius * (1.0f - v);
                     const float y = height + 0.006f * std::sin(38.0f * r) * (0.4f + 0.6f * v) +
@@ -243,12 +243,12 @@ Surface pot(const Detail& detail) {
                                        {0.0f, 0.49f}})) {
     profiles.push_back(piece);
   }
-  return lathe(profiles, detail.steps(28, 5));
+  return lathe(profiles, detail.steps(22, 5));
 }
 
 Surface palm_leaves(const Detail& detail, int seed) {
   Surface leaves;
-  const int count = detail.shows(0.5f) ? 38 : 14;
+  const int count = detail.shows(0.5f) ? 32 : 14;
   for (int k = 0; k < count; ++k) {
     const float t = static_cast<float>(k) / static_cast<float>(count);
     // Golden-angle phyllotaxis: inner leaves stand, outer ones arch over.
