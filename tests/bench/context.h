@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "lsp/vulkan_device.hpp"
+#include "ray_errors.h"
 #include "report.h"
 #include "scene_under_test.h"
 #include "timing.h"

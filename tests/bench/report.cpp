@@ -78,7 +78,12 @@ std::string table_html(const Table& table) {
 std::string list_html(const char* name, const std::vector<std::string>& items) {
   if (items.empty()) return "";
   std::string html = std::string("<ul class=") + name + ">\n";
-  for (const std::string& item : items) html += "<li>" + escape(item) + "</li>\n";
+  // The page shows the first few; report.json holds all.
+  constexpr size_t kShown = 24;
+  for (size_t i = 0; i < items.size() && i < kShown; ++i) html += "<li>" + escape(items[i]) + "</li>\n";
+  if (items.size() > kShown) {
+    html += "<li>and " + std::to_string(items.size() - kShown) + " more, in report.json</li>\n";
+  }
   return html + "</ul>\n";
 }
 

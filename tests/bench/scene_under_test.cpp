@@ -37,8 +37,13 @@ Bake line_space_bake(unsigned resolution, unsigned depth) {
   return {"N" + n + "-D" + d, {"--resolution", n, "--depth", d}};
 }
 
-SceneUnderTest::SceneUnderTest(const std::filesystem::path& input, const std::filesystem::path& cache)
-    : name_(input.stem().string()), input_(input), cache_(cache), is_file_(input.extension() == ".lsp") {
+SceneUnderTest::SceneUnderTest(const std::filesystem::path& input, const std::filesystem::path& cache,
+                               const Bake& first)
+    : name_(input.stem().string()),
+      input_(input),
+      cache_(cache),
+      base_(first),
+      is_file_(input.extension() == ".lsp") {
   const OpenFile file(base().path);
   if (!file.has_exact_tree()) {
     throw Failure(Exit::kUnsupported, input.string(),
@@ -50,7 +55,7 @@ SceneUnderTest::SceneUnderTest(const std::filesystem::path& input, const std::fi
       soup_, [&](auto rays, auto hits) { reference_->closest(rays, hits); }, 512, 512);
 }
 
-const Baked& SceneUnderTest::base() { return bake(line_space_bake(6, 9)); }
+const Baked& SceneUnderTest::base() { return bake(base_); }
 
 const Baked& SceneUnderTest::bake(const Bake& how) {
   const auto known = bakes_.find(how.name);
@@ -58,7 +63,7 @@ const Baked& SceneUnderTest::bake(const Bake& how) {
   Baked baked;
   if (is_file_) {
     baked.path = input_;
-    baked.available = how.name == line_space_bake(6, 9).name;
+    baked.available = how.name == base_.name;
     baked.reason = "the scene was given as .lsp";
     baked.file_bytes = std::filesystem::file_size(input_);
     return bakes_[how.name] = baked;

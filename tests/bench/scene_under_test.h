@@ -44,9 +44,10 @@ struct RaySet {
 
 class SceneUnderTest {
  public:
-  // `input` is a mesh file, or an .lsp file, which is then measured as it is. Bakes go to `cache`. Bakes the
-  // paper's N = 6, D = 9 to know the triangles. Throws Failure.
-  SceneUnderTest(const std::filesystem::path& input, const std::filesystem::path& cache);
+  // `input` is a mesh file, or an .lsp file, which is then measured as it is. Bakes go to `cache`. `first` is
+  // baked at once to know the triangles; the default is the paper's N = 6, D = 9. Throws Failure.
+  SceneUnderTest(const std::filesystem::path& input, const std::filesystem::path& cache,
+                 const Bake& first = line_space_bake(6, 9));
 
   const std::string& name() const { return name_; }
   bool is_file() const { return is_file_; }  // given as .lsp: there is one bake only
@@ -57,7 +58,7 @@ class SceneUnderTest {
   // Bakes once and remembers; of a scene given as .lsp only base() exists, others are not available. Throws
   // Failure where lsp-bake fails for any reason but an option it does not support.
   const Baked& bake(const Bake& how);
-  const Baked& base();  // N = 6, D = 9, or the file given
+  const Baked& base();  // what was baked first, or the file given
 
   // The accuracy rays: area-weighted, cosine, shuffled. Made once per count.
   const RaySet& surface(size_t count);
@@ -74,6 +75,7 @@ class SceneUnderTest {
 
   std::string name_;
   std::filesystem::path input_, cache_;
+  Bake base_;
   bool is_file_ = false;
   std::map<std::string, Baked> bakes_;
   Soup soup_;

@@ -57,7 +57,7 @@ class VulkanFile : public Tracer {
 };
 
 void add_structure(Context& context, SceneUnderTest& scene, const Structure& structure, Table& table,
-                   Table& loads, const std::vector<RaySet>& sets) {
+                   const std::vector<RaySet>& sets) {
   const Baked& baked = scene.bake(structure.bake);
   if (!baked.available) {
     Json row;
@@ -121,7 +121,6 @@ void add_structure(Context& context, SceneUnderTest& scene, const Structure& str
     row["triangle_tests"] = work.triangles;
     table.rows.push_back(row);
   }
-  (void)loads;
 }
 
 // Opens the file and traces 64 rays, cold (the page cache told to forget the file) or warm; in milliseconds.
@@ -228,7 +227,7 @@ Section paper_suite(Context& context) {
     const std::vector<RaySet> sets = {scene->diffuse(context.timing_rays(), false),
                                       scene->diffuse(context.timing_rays(), true)};
     for (const Structure& structure : structures(context.quick)) {
-      add_structure(context, *scene, structure, table, loads, sets);
+      add_structure(context, *scene, structure, table, sets);
     }
     add_load(context, *scene, loads);
   }

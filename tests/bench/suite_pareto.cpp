@@ -1,0 +1,246 @@
+// Run time against error against bytes: every bake crossed with every way to trace it, and the frontier.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <map>
+
+#include "context.h"
+#include "ray_errors.h"
+
+namespace lsp::bench {
+namespace {
+
+std::vector<Bake> bakes(bool quick) {
+  std::vector<Bake> all = {line_space_bake(4, 9), line_space_bake(6, 9)};
+  all.push_back({"N4-D6,9,12", {"--resolution", "4", "--depth", "6,9,12"}});
+  if (quick) return all;
+  all.push_back(line_space_bake(2, 12));
+  all.push_back(line_space_bake(4, 12));
+  all.push_back(line_space_bake(6, 12));
+  all.push_back(line_space_bake(2, 15));
+  all.push_back(line_space_bake(3, 15));
+  all.push_back({"N3-D9,12,15", {"--resolution", "3", "--depth", "9,12,15"}});
+  all.push_back({"N6-T8", {"--resolution", "6", "--depth", "9", "--triangles", "8"}});
+  for (const char* preset : {"fast", "balanced", "accurate"}) {
+    all.push_back({std::string("preset-") + preset, {"--preset", preset}});
+  }
+  all.push_back({"NT6", {"--base", "ntree", "--resolution", "6", "--depth", "2"}});
+  return all;
+}
+
+// Does any Line Space have another one below it? Only then does a level of detail change anything.
+bool has_levels(const OpenFile& file) {
+  const lsp_scene& scene = file.scene();
+  for (uint32_t i = 0; i < scene.header->node_count; ++i) {
+    for (const uint32_t reference : {scene.nodes[i].line_space0, scene.nodes[i].line_space1}) {
+      if (reference != LSP_NONE && !(reference & LSP_TERMINAL_BIT)) return true;
+    }
+  }
+  return false;
+}
+
+std::vector<Mode> modes_for(const OpenFile& file, bool quick) {
+  std::vector<Mode> modes = {{.approximate = true}, {.approximate = true, .near_approximate = true}};
+  if (!has_levels(file)) return modes;
+  if (quick) {
+    modes.push_back({.approximate = true, .lod = 0.1f});
+    return modes;
+  }
+  for (const float lod : {0.03f, 0.06f, 0.12f, 0.25f, 0.5f})
+    modes.push_back({.approximate = true, .lod = lod});
+  return modes;
+}
+
+struct Sample {
+  std::string scene, bake, mode;
+  double times, times_vulkan, wrong_percent, depth_percent, megabytes;
+};
+
+// Marks what nothing else beats in both speed and `error`.
+std::vector<bool> frontier(const std::vector<Sample>& samples, double Sample::*error) {
+  std::vector<bool> best(samples.size(), true);
+  for (size_t i = 0; i < samples.size(); ++i) {
+    for (const Sample& other : samples) {
+      if (other.scene != samples[i].scene) continue;
+      const bool no_worse = other.times >= samples[i].times && other.*error <= samples[i].*error;
+      const bool better = other.times > samples[i].times || other.*error < samples[i].*error;
+      if (no_worse && better) best[i] = false;
+    }
+  }
+  return best;
+}
+
+// The best speed at no more than `limit` % wrong answers, per scene; 1 (exact) where nothing approximate
+// helps.
+std::map<std::string, Sample> best_within(const std::vector<Sample>& samples, double limit) {
+  std::map<std::string, Sample> best;
+  for (const Sample& sample : samples) {
+    const auto [it, fresh] =
+        best.try_emplace(sample.scene, Sample{sample.scene, "-", "exact", 1, 1, 0, 0, 0});
+    if (sample.wrong_percent <= limit && sample.times > it->second.times) it->second = sample;
+  }
+  return best;
+}
+
+}  // namespace
+
+Section pareto_suite(Context& context) {
+  Section section{"pareto", "Run time against error", {}, {}, {}, {}};
+  section.paragraphs.push_back(
+      "Every bake, traced in every way, on shuffled diffuse rays from what a camera sees, all threads. Speed "
+      "is "
+      "times the exact trace of the same file in the same run; wrong answers are rays that hit where truth "
+      "misses "
+      "or the reverse. On the frontier nothing else is both faster and less often wrong.");
+  std::vector<Sample> samples;
+  std::vector<Json> rows;
+  const size_t rays = context.timing_rays() / 2;
+  for (const auto& scene : context.scenes) {
+    const RaySet set = scene->diffuse(rays, true);
+    for (const Bake& how : bakes(context.quick)) {
+      const Baked& baked = scene->bake(how);
+      if (!baked.available) continue;
+      context.progress("pareto: " + scene->name() + " " + how.name);
+      const OpenFile file(baked.path);
+      if (!file.has_line_spaces() || !file.has_exact_tree()) continue;
+      std::vector<Mode> modes = {{}};
+      for (const Mode& mode : modes_for(file, context.quick)) modes.push_back(mode);
+      const auto tracer = cpu_tracer(file, context.threads);
+      std::vector<std::vector<LspHit>> hits(modes.size(), std::vector<LspHit>(set.rays.size()));
+      std::vector<Contender> contenders;
+      for (size_t m = 0; m < modes.size(); ++m) {
+        contenders.push_back(
+            {modes[m].name(), [&, m] { return tracer->trace(modes[m], set.rays, hits[m]); }});
+      }
+      const std::vector<Timing> timings = race(contenders, 1, std::max(3, context.repeats() - 2));
+      for (size_t m = 1; m < modes.size(); ++m) {
+        const RayErrors errors = ray_errors(scene->soup(), set.rays, set.truth, hits[m]);
+        const Work work =
+            count_work(file, modes[m], std::span(set.rays).first(std::min<size_t>(set.rays.size(), 20000)));
+        Sample sample{scene->name(),
+                      how.name,
+                      modes[m].name(),
+                      timings[0].median / timings[m].median,
+                      0,
+                      100 * errors.wrong_share(),
+                      100 * errors.depth_diagonal.mean,
+                      static_cast<double>(baked.file_bytes) * 1e-6};
+        Json row;
+        row["scene"] = sample.scene;
+        row["bake"] = sample.bake;
+        row["mode"] = sample.mode;
+        row["times"] = sample.times;
+        row["mrays"] = mega(set.rays.size(), timings[m]);
+        row["spread"] = 100 * timings[m].spread;
+        row["file_mb"] = sample.megabytes;
+        row["bake_seconds"] = baked.seconds;
+        add_errors(row, errors);
+        row["nodes"] = work.nodes;
+        row["shafts"] = work.shafts;
+        row["triangle_tests"] = work.triangles;
+        samples.push_back(sample);
+        rows.push_back(row);
+      }
+    }
+  }
+  const std::vector<bool> best_wrong = frontier(samples, &Sample::wrong_percent);
+  const std::vector<bool> best_depth = frontier(samples, &Sample::depth_percent);
+  for (size_t i = 0; i < rows.size(); ++i) {
+    rows[i]["frontier"] = best_wrong[i] && best_depth[i] ? "both"
+                          : best_wrong[i]                ? "wrong"
+                          : best_depth[i]                ? "depth"
+                                                         : "";
+  }
+  Table table{"pareto", "All combinations", "", {}, rows};
+  table.columns = {{"scene", "scene"},         {"bake", "bake"},           {"mode", "mode"},
+                   {"frontier", "frontier"},   {"times", "x exact"},       {"mrays", "Mrays/s"},
+                   {"spread", "spread, %", 1}, {"file_mb", "file, MB", 1}, {"bake_seconds", "bake, s", 1}};
+  for (const Column& column : error_columns()) table.columns.push_back(column);
+  for (const Column& column : {Column{"nodes", "nodes a ray", 1}, Column{"shafts", "look-ups a ray", 1},
+                               Column{"triangle_tests", "triangles a ray", 1}}) {
+    table.columns.push_back(column);
+  }
+
+  Plot speed{"pareto_wrong",
+             "Speed against wrong answers",
+             "Up and left is better.",
+             {"wrong answers, % of rays", true},
+             {"times the exact trace", false},
+             {}};
+  Plot depth{"pareto_depth",
+             "Speed against depth error",
+             "Up and left is better.",
+             {"mean depth error, % of the diagonal", true},
+             {"times the exact trace", false},
+             {}};
+  Plot bytes{"pareto_bytes",     "Wrong answers against bytes",      "Down and left is better.",
+             {"file, MB", true}, {"wrong answers, % of rays", true}, {}};
+  Plot curve{"pareto_frontier",
+             "The frontier of each scene",
+             "",
+             {"wrong answers, % of rays", true},
+             {"times the exact trace", false},
+             {}};
+  for (const auto& scene : context.scenes) {
+    Series s{scene->name(), {}, false}, d = s, b = s, f{scene->name(), {}, true};
+    for (size_t i = 0; i < samples.size(); ++i) {
+      const Sample& sample = samples[i];
+      if (sample.scene != scene->name()) continue;
+      const std::string label = sample.bake + ", " + sample.mode;
+      s.points.push_back({std::max(sample.wrong_percent, 1e-3), sample.times, label});
+      d.points.push_back({std::max(sample.depth_percent, 1e-4), sample.times, label});
+      b.points.push_back({sample.megabytes, std::max(sample.wrong_percent, 1e-3), label});
+      if (best_wrong[i]) f.points.push_back(s.points.back());
+    }
+    std::sort(f.points.begin(), f.points.end(), [](const Point& a, const Point& c) { return a.x < c.x; });
+    speed.series.push_back(s);
+    depth.series.push_back(d);
+    bytes.series.push_back(b);
+    curve.series.push_back(f);
+  }
+
+  Table limits{"pareto_limits",
+               "The fastest within a limit of wrong answers",
+               "\"exact\" where nothing approximate is faster within the limit.",
+               {{"limit", "wrong answers at most, %", 1},
+                {"scene", "scene"},
+                {"times", "x exact"},
+                {"bake", "bake"},
+                {"mode", "mode"},
+                {"wrong_percent", "wrong %", 3},
+                {"file_mb", "file, MB", 1}},
+               {}};
+  for (const double limit : {0.1, 0.5, 1.0, 2.0}) {
+    double log_sum = 0, least = INFINITY, greatest = 0, megabytes = 0;
+    const std::map<std::string, Sample> best = best_within(samples, limit);
+    for (const auto& [name, sample] : best) {
+      Json row;
+      row["limit"] = limit;
+      row["scene"] = name;
+      row["times"] = sample.times;
+      row["bake"] = sample.bake;
+      row["mode"] = sample.mode;
+      row["wrong_percent"] = sample.wrong_percent;
+      if (sample.megabytes > 0) row["file_mb"] = sample.megabytes;
+      limits.rows.push_back(row);
+      log_sum += std::log(sample.times);
+      least = std::min(least, sample.times);
+      greatest = std::max(greatest, sample.times);
+      megabytes += sample.megabytes / static_cast<double>(best.size());
+    }
+    if (best.empty()) continue;
+    char text[256];
+    std::snprintf(
+        text, sizeof text,
+        "At up to %g %% wrong answers the approximate trace is %.2fx the exact one (geometric mean; %.2fx to "
+        "%.2fx over %zu scenes; CPU, %u threads, shuffled diffuse rays).",
+        limit, std::exp(log_sum / static_cast<double>(best.size())), least, greatest, best.size(),
+        context.threads);
+    context.answers.push_back(text);
+  }
+  section.plots = {curve, speed, depth, bytes};
+  section.tables = {std::move(limits), std::move(table)};
+  return section;
+}
+
+}  // namespace lsp::bench
