@@ -29,7 +29,7 @@ struct BakeOptions {
   bool line_spaces = true;
   BvhOptions bvh;
   LineSpaceOptions line_space;
-  float plane_tolerance = 0.05f;       // LspHeader.plane_tolerance
+  float plane_tolerance = 0.0f;        // LspHeader.plane_tolerance
   float normal_angle_degrees = 180.0f;  // LspHeader.normal_angle_cos; 180: no hit is rejected
   uint64_t memory_limit = 0;           // bytes, 0: none
 };

@@ -72,6 +72,9 @@ class Chooser {
   uint32_t last_depth_;
 };
 
+constexpr uint32_t kFirstSamples = 3;
+constexpr float kSettled = 0.01f;  // mean error, in lengths of the shaft, under which a plane is good enough
+
 // One Line Space before it finds its place in the file.
 struct Filled {
   LspLineSpace record;
@@ -79,15 +82,37 @@ struct Filled {
   std::vector<uint32_t> candidates;
 };
 
-// The centroid of a patch. Faces and patches are numbered as in lsp/layout.h.
-glm::vec3 patch_centroid(const glm::vec3& lo, const glm::vec3& hi, uint32_t face, uint32_t patch, uint32_t n) {
+// The point of a patch at (x, y) in [0, 1)^2 of it. Faces and patches are numbered as in lsp/layout.h.
+glm::vec3 patch_point(const glm::vec3& lo, const glm::vec3& hi, uint32_t face, uint32_t patch, uint32_t n, float x,
+                      float y) {
   const int axis = int(face / 2);
   const int u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;
   glm::vec3 p;
   p[axis] = face % 2 ? hi[axis] : lo[axis];
-  p[u] = lo[u] + (hi[u] - lo[u]) * ((float(patch % n) + 0.5f) / float(n));
-  p[v] = lo[v] + (hi[v] - lo[v]) * ((float(patch / n) + 0.5f) / float(n));
+  p[u] = lo[u] + (hi[u] - lo[u]) * ((float(patch % n) + x) / float(n));
+  p[v] = lo[v] + (hi[v] - lo[v]) * ((float(patch / n) + y) / float(n));
   return p;
+}
+
+// Where the rays of a shaft start and end in its patches: the centroids first, then a four-dimensional
+// low-discrepancy sequence (Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences", 2018).
+struct Sample {
+  float in_x, in_y, out_x, out_y;
+};
+
+std::vector<Sample> shaft_samples(uint32_t count) {
+  constexpr double kRoot = 1.1673039782614187;  // of x^5 = x + 1
+  std::vector<Sample> samples = {{0.5f, 0.5f, 0.5f, 0.5f}};
+  for (uint32_t i = 1; i < count; ++i) {
+    double f[4], a = 1;
+    for (double& x : f) {
+      a /= kRoot;
+      x = 0.5 + i * a;
+      x -= std::floor(x);
+    }
+    samples.push_back({float(f[0]), float(f[1]), float(f[2]), float(f[3])});
+  }
+  return samples;
 }
 
 // Fills one Line Space: for every shaft the triangle that the ray from the centroid of its start patch to the
@@ -125,31 +150,92 @@ class Filler {
     const uint32_t shafts = (binary ? 15 : 30) * n * n * n * n;
     std::vector<uint32_t> hit(shafts, LSP_NONE);
     const uint32_t patches = n * n;
-    std::vector<glm::vec3> centroids(6 * patches);
-    for (uint32_t f = 0; f < 6; ++f)
-      for (uint32_t p = 0; p < patches; ++p) centroids[f * patches + p] = patch_centroid(lo_, hi_, f, p, n);
-
-    rays_.resize(patches);
-    hits_.resize(patches);
+    const std::vector<Sample> samples = shaft_samples(binary ? 1 : options_.samples);
+    const lsp_trace_options trace = {binary ? LSP_TRACE_ANY_HIT : 0u, 0.0f};
     for (uint32_t in = 0; in < 6; ++in)
       for (uint32_t out = binary ? in + 1 : 0; out < 6; ++out) {
         if (in == out) continue;
         for (uint32_t p = 0; p < patches; ++p) {
-          const glm::vec3 a = centroids[in * patches + p];
-          for (uint32_t q = 0; q < patches; ++q)
-            rays_[q] = {f3(a), 0.0f, f3(centroids[out * patches + q] - a), 1.0f};
-          const lsp_trace_options trace = {binary ? LSP_TRACE_ANY_HIT : 0u, 0.0f};
-          if (lsp_trace(&scene_, &trace, rays_.data(), hits_.data(), patches, nullptr, nullptr) != LSP_OK)
-            throw Failure(Exit::kInternal, "", "the tracer refused the baker's own tree");
           const uint32_t base =
               binary ? LSP_SHAFT_INDEX_SYMMETRIC(in, out, p, 0u, n) : LSP_SHAFT_INDEX(in, out, p, 0u, n);
-          for (uint32_t q = 0; q < patches; ++q) hit[base + q] = hits_[q].primitive;
+          fill_row(in, p, out, samples, trace, &hit[base]);
         }
       }
     return pack(hit);
   }
 
  private:
+  // The shafts from one patch to all patches of one face. The first rays of a shaft often settle it: all miss,
+  // or one plane answers them all; only the other shafts are given the remaining samples.
+  void fill_row(uint32_t in, uint32_t p, uint32_t out, const std::vector<Sample>& samples,
+                const lsp_trace_options& trace, uint32_t* row) {
+    const uint32_t n = options_.resolution, patches = n * n;
+    const uint32_t all = uint32_t(samples.size()), first = std::min(all, kFirstSamples);
+    const auto ray = [&](uint32_t q, const Sample& s) -> LspRay {
+      const glm::vec3 a = patch_point(lo_, hi_, in, p, n, s.in_x, s.in_y);
+      const glm::vec3 b = patch_point(lo_, hi_, out, q, n, s.out_x, s.out_y);
+      return {f3(a), 0.0f, f3(b - a), 1.0f};
+    };
+    const auto trace_all = [&] {
+      hits_.resize(rays_.size());
+      if (lsp_trace(&scene_, &trace, rays_.data(), hits_.data(), rays_.size(), nullptr, nullptr) != LSP_OK)
+        throw Failure(Exit::kInternal, "", "the tracer refused the baker's own tree");
+    };
+    rays_.clear();
+    for (uint32_t q = 0; q < patches; ++q)
+      for (uint32_t i = 0; i < first; ++i) rays_.push_back(ray(q, samples[i]));
+    trace_all();
+    if (all == 1) {
+      for (uint32_t q = 0; q < patches; ++q) row[q] = hits_[q].primitive;
+      return;
+    }
+    unsettled_.clear();
+    for (uint32_t q = 0; q < patches; ++q) {
+      float cost;
+      row[q] = choose(&rays_[q * first], &hits_[q * first], first, cost);
+      if (cost > kSettled * float(first)) unsettled_.push_back(q);
+    }
+    if (first == all || unsettled_.empty()) return;
+    rays_.clear();
+    for (const uint32_t q : unsettled_)
+      for (const Sample& s : samples) rays_.push_back(ray(q, s));
+    trace_all();
+    for (size_t i = 0; i < unsettled_.size(); ++i) {
+      float cost;
+      row[unsettled_[i]] = choose(&rays_[i * all], &hits_[i * all], all, cost);
+    }
+  }
+
+  // The triangle among those hit, or none, whose plane answers the rays of a shaft with the smallest sum of
+  // errors: the distance along the ray where both hit, all of it where only one does.
+  uint32_t choose(const LspRay* rays, const LspHit* hits, uint32_t count, float& best_cost) const {
+    best_cost = 0;
+    for (uint32_t i = 0; i < count; ++i) best_cost += hits[i].primitive != LSP_NONE ? 1.0f : 0.0f;
+    uint32_t best = LSP_NONE;
+    if (best_cost == 0) return best;
+    for (uint32_t c = 0; c < count; ++c) {
+      if (hits[c].primitive == LSP_NONE) continue;
+      const LspTriangle& tri = scene_.triangles[hits[c].primitive];
+      const glm::vec3 v0 = vec(tri.v0);
+      const glm::vec3 n = glm::cross(vec(tri.v1) - v0, vec(tri.v2) - v0);
+      float cost = 0;
+      for (uint32_t i = 0; i < count && cost < best_cost; ++i) {
+        const float t = glm::dot(v0 - vec(rays[i].origin), n) / glm::dot(vec(rays[i].direction), n);
+        const bool plane_hit = t >= 0 && t <= 1;
+        const bool hit = hits[i].primitive != LSP_NONE;
+        if (plane_hit && hit)
+          cost += std::fabs(t - hits[i].t);
+        else if (plane_hit != hit)
+          cost += 1;
+      }
+      if (cost < best_cost) {
+        best_cost = cost;
+        best = hits[c].primitive;
+      }
+    }
+    return best;
+  }
+
   Filled pack(const std::vector<uint32_t>& hit) const {
     const uint32_t n = options_.resolution;
     const uint32_t shafts = uint32_t(hit.size());
@@ -204,6 +290,7 @@ class Filler {
   glm::vec3 lo_, hi_;
   std::vector<LspRay> rays_;
   std::vector<LspHit> hits_;
+  std::vector<uint32_t> unsettled_;
 };
 
 }  // namespace

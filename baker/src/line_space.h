@@ -23,6 +23,9 @@ struct LineSpaceOptions {
   LineSpaceKind kind = LineSpaceKind::kCandidates;
   uint32_t resolution = 6;            // N: patches along an edge of the box, 1 to LSP_MAX_RESOLUTION
   std::vector<uint32_t> depths = {9};  // D: inner nodes at these depths carry a Line Space (the root is at 0)
+  // Rays per shaft that choose its candidate: 1 is the paper's centroid ray, more pick the triangle (or none)
+  // whose plane answers all of them best.
+  uint32_t samples = 5;
   uint32_t triangles = 0;             // T: so does a node above the last depth with fewer triangles than this
 };
 

@@ -37,7 +37,8 @@ struct Arguments {
   uint32_t threads = 0;
   uint64_t memory_limit = 0;
   float normal_angle = 180;
-  float plane_tolerance = 0.05f;
+  float plane_tolerance = 0.0f;
+  uint32_t samples = 5;
   float crease_angle = 40;
   bool no_splits = false;
   CommonOptions common;
@@ -74,6 +75,7 @@ Json provenance(const Arguments& a, const Mesh& mesh, const std::array<uint64_t,
             {"resolution", a.resolution},
             {"depth", a.depths},
             {"triangles", a.triangles},
+            {"samples", a.samples},
             {"for", kPurposes.at(a.purpose)},
             {"exact", !a.no_exact},
             {"line_spaces", !a.no_line_spaces},
@@ -124,6 +126,7 @@ Exit run(const Arguments& a) {
   options.line_space.resolution = a.resolution;
   options.line_space.depths = a.depths;
   options.line_space.triangles = a.triangles;
+  options.line_space.samples = a.samples;
   options.line_space.kind =
       a.purpose == Purpose::kVisibility ? LineSpaceKind::kBinary : LineSpaceKind::kCandidates;
   options.normal_angle_degrees = a.normal_angle;
@@ -209,6 +212,8 @@ int main(int argc, char** argv) {
       ->delimiter(',')
       ->check(CLI::Range(0u, 40u));
   app.add_option("--triangles", a.triangles, "T: nodes above D with fewer triangles get a Line Space too");
+  app.add_option("--samples", a.samples, "Rays that choose a shaft's candidate; 1: the centroid ray alone, as the paper does")
+      ->check(CLI::Range(1u, 64u));
   app.add_option("--for", a.purpose, "What the file is for")
       ->transform(CLI::CheckedTransformer(std::map<std::string, Purpose>{{"visibility", Purpose::kVisibility},
                                                                          {"ao", Purpose::kAo},
