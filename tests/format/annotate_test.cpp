@@ -1,0 +1,102 @@
+// lsp-info --annotate accounts for every byte: of the corpus, of every prefix of a file, of damaged files.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "annotate.h"
+#include "mutations.h"
+#include "mutator.h"
+#include "scenes.h"
+#include "summary.h"
+
+namespace {
+
+using namespace lsp;
+using namespace lsp::corpus;
+using namespace lsp::format;
+
+void expect_all_accounted(const Bytes& bytes, const std::string& context, const std::string& section = {}) {
+  uint64_t at = 0;
+  annotate(bytes, {section}, [&](const Range& range) {
+    EXPECT_EQ(range.offset, at) << context;
+    EXPECT_GT(range.bytes, 0u) << context << " at " << at;
+    EXPECT_FALSE(range.path.empty() || range.meaning.find('\n') != std::string::npos)
+        << context << " at " << at;
+    at = range.offset + range.bytes;
+  });
+  EXPECT_EQ(at, bytes.size()) << context;
+}
+
+TEST(Annotate, EveryByteOfTheCorpus) {
+  for (const ValidFile& file : valid_files()) {
+    expect_all_accounted(file.bytes, file.name);
+    expect_all_accounted(file.bytes, file.name, "NODE");
+    expect_all_accounted(file.bytes, file.name, "CAND");
+  }
+  for (const InvalidFile& file : invalid_files()) expect_all_accounted(file.bytes, file.name);
+}
+
+TEST(Annotate, EveryByteOfEveryPrefix) {
+  const Bytes bytes = encode(full_scene());
+  for (size_t size = 0; size < bytes.size(); ++size)
+    expect_all_accounted(Bytes(bytes.begin(), bytes.begin() + static_cast<ptrdiff_t>(size)),
+                         std::to_string(size));
+}
+
+TEST(Annotate, EveryByteOfDamagedFiles) {
+  const Bytes good = encode(full_scene());
+  for (uint64_t seed = 0; seed < 5000; ++seed) {
+    Bytes bytes = good;
+    Random random(seed);
+    mutate(bytes, random);
+    expect_all_accounted(bytes, "seed " + std::to_string(seed));
+  }
+}
+
+// In a sound file nothing is unknown, cut off or extra.
+TEST(Annotate, SoundFilesHaveNoUnknownBytes) {
+  for (const ValidFile& file : valid_files())
+    annotate(file.bytes, {}, [&](const Range& range) {
+      EXPECT_NE(range.path, "/unknown") << file.name;
+      EXPECT_NE(range.path, "/extra") << file.name;
+      EXPECT_EQ(range.meaning.find("cut off"), std::string::npos) << file.name;
+    });
+}
+
+TEST(Annotate, OneSectionInFull) {
+  size_t nodes = 0;
+  annotate(encode(full_scene()), {"NODE"},
+           [&](const Range& range) { nodes += range.path.starts_with("/sections/NODE/"); });
+  EXPECT_EQ(nodes, full_scene().nodes.size());
+}
+
+TEST(Info, CountsOfTheTreeAddUp) {
+  for (const ValidFile& file : valid_files()) {
+    const auto json = summarize(file.bytes, file.name, uint64_t{1} << 26);
+    uint64_t nodes = 0, line_spaces = 0;
+    for (const auto& row : json["depths"]) {
+      nodes += row["nodes"].get<uint64_t>();
+      line_spaces += row["line_spaces"].get<uint64_t>();
+    }
+    EXPECT_EQ(nodes, json["counts"]["nodes"]) << file.name;
+    EXPECT_EQ(line_spaces, json["counts"]["line_spaces"]) << file.name;
+    EXPECT_EQ(json["findings"], 0) << file.name;
+    EXPECT_FALSE(summary_text(json, "").empty());
+  }
+}
+
+TEST(Info, SummarisesDamagedFiles) {
+  const Bytes good = encode(full_scene());
+  for (uint64_t seed = 0; seed < 5000; ++seed) {
+    Bytes bytes = good;
+    Random random(seed);
+    mutate(bytes, random);
+    try {
+      summary_text(summarize(bytes, "damaged", uint64_t{1} << 26), "");
+    } catch (const std::runtime_error&) {
+      // Refused as no .lsp file, or as one of another version.
+    }
+  }
+}
+
+}  // namespace
