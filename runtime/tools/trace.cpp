@@ -1,15 +1,13 @@
 // lsp-trace: traces a file of rays against an .lsp file.
 #include <algorithm>
 #include <iostream>
-#include <optional>
 #include <thread>
 
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "lsp/program.h"
+#include "lsp/command_line.h"
 #include "lsp/scene_file.hpp"
 #include "ray_files.h"
 #include "trace_run.h"
@@ -30,14 +28,11 @@ struct Options {
   float lod = 0;
   uint32_t repeats = 1;
   uint32_t threads = std::max(1u, std::thread::hardware_concurrency());
-  bool quiet = false;
-  bool json = false;
+  CommonOptions common;
 };
 
 void define(CLI::App& app, Options& options) {
-  app.set_version_flag("--version", std::string("lsp-trace ") + kProgramVersion + ", format " +
-                                        std::to_string(LSP_VERSION_MAJOR) + "." +
-                                        std::to_string(LSP_VERSION_MINOR));
+  add_common_options(app, "lsp-trace", options.common);
   app.add_option("FILE.lsp", options.file, "The scene")->required();
   app.add_option("--rays", options.rays, "Rays: 32 bytes each, origin, tmin, direction, tmax as float32")
       ->required();
@@ -64,8 +59,6 @@ void define(CLI::App& app, Options& options) {
                  "Part of the Vulkan device's name; without it a GPU if there is one");
   app.add_option("--load", options.load_path, "How the scene gets to the Vulkan device")
       ->check(CLI::IsMember({"automatic", "import", "upload"}));
-  app.add_flag("--quiet", options.quiet, "Print nothing but errors");
-  app.add_flag("--json", options.json, "Print one JSON object");
 }
 
 double median(std::vector<double> values) {
@@ -90,7 +83,7 @@ TraceRequest make_request(const Options& options, const LspHeader& header) {
   request.device = options.device;
   if (options.load_path == "import") request.load_path = LoadPath::kImport;
   if (options.load_path == "upload") request.load_path = LoadPath::kUpload;
-  request.progress = !options.quiet && isatty(STDERR_FILENO) != 0;
+  request.progress = !options.common.quiet && isatty(STDERR_FILENO) != 0;
   return request;
 }
 
@@ -130,17 +123,24 @@ nlohmann::ordered_json to_json(const Options& options, const TraceRequest& reque
 }
 
 void print(const nlohmann::ordered_json& json) {
-  const auto number = [&](const char* key) { return json[key].get<double>(); };
-  printf("%.0f rays (%.0f invalid), %.0f hits, %s, %s\n", number("rays"), number("invalid"), number("hits"),
-         json["mode"].get<std::string>().c_str(), json["query"].get<std::string>().c_str());
-  printf("%.3f Mrays/s on %s, load path %s\n", number("mrays_per_second"),
-         json["device"].get<std::string>().c_str(), json["load_path"].get<std::string>().c_str());
-  printf("a ray: %.2f nodes, %.2f shafts, %.2f triangles\n", number("nodes_per_ray"),
-         number("shafts_per_ray"), number("triangles_per_ray"));
-  printf("bytes: %.0f mapped, %.0f paged in, %.0f imported, %.0f uploaded\n", number("bytes_mapped"),
-         number("bytes_paged_in"), number("bytes_imported"), number("bytes_uploaded"));
-  if (number("retraced") > 0)
-    printf("%.0f rays were cut short by the device and traced on the CPU\n", number("retraced"));
+  const auto number = [&](const char* key, int digits) {
+    char text[64];
+    snprintf(text, sizeof text, "%.*f", digits, json[key].get<double>());
+    return std::string(text);
+  };
+  const auto word = [&](const char* key) { return json[key].get<std::string>(); };
+  std::cout << number("rays", 0) << " rays (" << number("invalid", 0) << " invalid), " << number("hits", 0)
+            << " hits, " << word("mode") << ", " << word("query") << "\n"
+            << number("mrays_per_second", 3) << " Mrays/s on " << word("device") << ", load path "
+            << word("load_path") << "\n"
+            << "a ray: " << number("nodes_per_ray", 2) << " nodes, " << number("shafts_per_ray", 2)
+            << " shafts, " << number("triangles_per_ray", 2) << " triangles\n"
+            << "bytes: " << number("bytes_mapped", 0) << " mapped, " << number("bytes_paged_in", 0)
+            << " paged in, " << number("bytes_imported", 0) << " imported, " << number("bytes_uploaded", 0)
+            << " uploaded\n";
+  if (json["retraced"] != 0) {
+    std::cout << number("retraced", 0) << " rays were cut short by the device and traced on the CPU\n";
+  }
 }
 
 // What a packed file may grow to: the machine's memory.
@@ -150,7 +150,7 @@ uint64_t physical_memory() {
   return pages > 0 && page > 0 ? static_cast<uint64_t>(pages) * static_cast<uint64_t>(page) : UINT64_MAX;
 }
 
-void run(const Options& options) {
+Exit run(const Options& options) {
   const SceneFile file(options.file, physical_memory());
   const std::vector<LspRay> rays = read_rays(options.rays);
   std::vector<LspHit> hits(rays.size());
@@ -163,41 +163,20 @@ void run(const Options& options) {
     throw Failure(failure.exit(), failure.file().empty() ? options.file : failure.file(), failure.what());
   }
   write_hits(options.hits, hits);
-  if (options.json) {
+  if (options.common.json) {
     std::cout << json.dump(2) << "\n";
-  } else if (!options.quiet) {
+  } else if (!options.common.quiet) {
     print(json);
   }
-}
-
-int run_program(int argc, char** argv) {
-  CLI::App app("Traces a file of rays against an .lsp file and writes a file of hits.");
-  Options options;
-  define(app, options);
-  try {
-    app.parse(argc, argv);
-    run(options);
-    return static_cast<int>(Exit::kDone);
-  } catch (const CLI::Success& e) {  // --help, --version
-    app.exit(e);
-    return static_cast<int>(Exit::kDone);
-  } catch (const CLI::ParseError& e) {
-    std::cerr << "lsp-trace: " << e.what() << "; see lsp-trace --help\n";
-    return static_cast<int>(Exit::kUsage);
-  } catch (const Failure& e) {
-    std::cerr << "lsp-trace: " << (e.file().empty() ? "" : e.file() + ": ") << e.what() << "\n";
-    return static_cast<int>(e.exit());
-  } catch (const std::bad_alloc&) {
-    std::cerr << "lsp-trace: " << options.rays
-              << ": there is not enough memory for its rays; trace fewer at once\n";
-    return static_cast<int>(Exit::kLimit);
-  } catch (const std::exception& e) {
-    std::cerr << "lsp-trace: internal error: " << e.what() << "; please report it\n";
-    return static_cast<int>(Exit::kInternal);
-  }
+  return Exit::kDone;
 }
 
 }  // namespace
 }  // namespace lsp
 
-int main(int argc, char** argv) { return lsp::run_program(argc, argv); }
+int main(int argc, char** argv) {
+  CLI::App app("Traces a file of rays against an .lsp file and writes a file of hits.");
+  lsp::Options options;
+  lsp::define(app, options);
+  return lsp::run_program("lsp-trace", app, argc, argv, [&] { return lsp::run(options); });
+}
