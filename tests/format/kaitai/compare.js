@@ -1,0 +1,96 @@
+// The second reader: lsp.ksy compiled to JavaScript reads every valid file of the corpus, and must find the
+// values that the C++ reader finds.
+//
+//   node compare.js LSP.KSY C++-DUMP-PROGRAM FILE.lsp...
+'use strict';
+const assert = require('assert');
+const fs = require('fs');
+const { execFileSync } = require('child_process');
+const compiler = require('kaitai-struct-compiler');
+const KaitaiStream = require('kaitai-struct/KaitaiStream');
+const yaml = require('yaml');
+
+async function compile(path) {
+  const description = yaml.parse(fs.readFileSync(path, 'utf8'));
+  const files = await compiler.compile('javascript', description, null, false);
+  const module_ = { exports: {} };
+  new Function('module', 'exports', 'require', files['Lsp.js'])(module_, module_.exports, require);
+  return module_.exports.Lsp || module_.exports;
+}
+
+const wide = new Set(['file_bytes', 'section_table_offset', 'primitive_count', 'offset', 'stored_bytes', 'bytes', 'element_count']);
+const floats = new Set(['normal_angle_cos', 'plane_tolerance', 'opacity', 'roughness', 'metallic', 'x', 'y', 'z']);
+
+// headerBytes becomes header_bytes; the compiler drops the underscore of reserved_0.
+const snake = (name) => (name === 'reserved0' ? 'reserved_0' : name.replace(/([A-Z])/g, '_$1').toLowerCase());
+const bits = (value) => new Uint32Array(new Float32Array([value]).buffer)[0];
+const hex = (bytes) => Buffer.from(bytes).toString('hex');
+
+// What a value of the description looks like in the dump; `owner` is the name of the type that holds it.
+function plain(value, name, owner) {
+  if (value instanceof Uint8Array) return hex(value);
+  if (Array.isArray(value)) return value.map((v) => plain(v, name, owner));
+  if (value !== null && typeof value === 'object') {
+    switch (value.constructor.name) {
+      case 'Vec3': return [bits(value.x), bits(value.y), bits(value.z)];
+      case 'ChildReference':
+      case 'LineSpaceReference':
+      case 'LineSpaceFormat': return value.value;
+      case 'Octahedral': return ((value.x & 0xffff) | (value.y << 16)) >>> 0;
+      default: return fields(value);
+    }
+  }
+  if (floats.has(name)) return bits(value);
+  // A bit word's offset has 32 bits, a section's 64.
+  if (wide.has(name) && owner !== 'BitWord') return String(value);
+  return value;
+}
+
+function fields(object) {
+  const result = {};
+  for (const key of Object.keys(object)) {
+    if (key.startsWith('_') || typeof object[key] === 'function') continue;
+    const name = snake(key);
+    result[name] = plain(object[key], name, object.constructor.name);
+  }
+  return result;
+}
+
+function dump(Lsp, path) {
+  const lsp = new Lsp(new KaitaiStream(fs.readFileSync(path)));
+  const sections = lsp.sections.map((section) => {
+    const result = fields(section);
+    const body = section.body;
+    if (body === undefined || body instanceof Uint8Array) {
+      result.stored = hex(section.stored);
+    } else if (body.elements !== undefined) {
+      result.elements = body.elements.map(fields);
+    } else if (body.words !== undefined) {
+      result.words = body.words;
+    } else {
+      result.json = body.json;
+    }
+    return result;
+  });
+  return { header: fields(lsp.header), sections };
+}
+
+async function main() {
+  const [ksy, program, ...files] = process.argv.slice(2);
+  const Lsp = await compile(ksy);
+  let values = 0;
+  const count = (v) => (v !== null && typeof v === 'object' ? Object.values(v).forEach(count) : (values += 1));
+  for (const file of files) {
+    const mine = dump(Lsp, file);
+    const theirs = JSON.parse(execFileSync(program, [file], { maxBuffer: 1 << 28, encoding: 'utf8' }));
+    assert.deepStrictEqual(mine, theirs, file);
+    count(mine);
+  }
+  assert(files.length > 0 && values > 1000, 'nothing was compared');
+  console.log(`${files.length} files, ${values} values, all equal`);
+}
+
+main().catch((error) => {
+  console.error(error.message || error);
+  process.exit(1);
+});

@@ -1,0 +1,103 @@
+// Prints every value of an .lsp file as JSON, for comparison with a second, independent reader. Floats are
+// printed as their bits, 64-bit numbers as strings, hashes as their 16 bytes in hexadecimal.
+#include <cstdio>
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <string_view>
+
+#include "fields.h"
+#include "file.h"
+#include "view.h"
+
+namespace {
+
+using namespace lsp::format;
+using Json = nlohmann::ordered_json;
+
+std::string hex(const std::byte* bytes, size_t count) {
+  std::string text;
+  for (size_t i = 0; i < count; ++i) {
+    char digits[4];
+    std::snprintf(digits, sizeof digits, "%02x", static_cast<unsigned>(bytes[i]));
+    text += digits;
+  }
+  return text;
+}
+
+Json word(const std::byte* bytes) {
+  uint32_t value;
+  std::memcpy(&value, bytes, sizeof value);
+  return value;
+}
+
+Json value_of(const Field& field, const std::byte* bytes) {
+  const std::byte* at = bytes + field.offset;
+  if (field.type == FieldType::kUint64) {
+    uint64_t value;
+    std::memcpy(&value, at, sizeof value);
+    return std::to_string(value);
+  }
+  if (field.bytes == 4) return word(at);
+  Json list = Json::array();
+  for (uint32_t i = 0; i < field.bytes; i += 4) list.push_back(word(at + i));
+  return list;
+}
+
+Json struct_of(const Struct& owner, const std::byte* bytes) {
+  Json json = Json::object();
+  for (size_t i = 0; i < owner.fields.size(); ++i) {
+    const Field& field = owner.fields[i];
+    const std::string_view name = field.name;
+    if (name == "magic_0") {
+      json["magic"] = hex(bytes + field.offset, 8);
+      ++i;
+    } else if (name.ends_with("hash_lo")) {
+      json[std::string(name.substr(0, name.size() - 3))] = hex(bytes + field.offset, 16);
+      ++i;
+    } else {
+      json[std::string(name)] = value_of(field, bytes);
+    }
+  }
+  return json;
+}
+
+Json section_of(const LspSection& entry, std::span<const std::byte> file) {
+  Json json = struct_of(struct_named("LspSection"), reinterpret_cast<const std::byte*>(&entry));
+  const std::span<const std::byte> data = file.subspan(entry.offset, entry.stored_bytes);
+  const int kind = kind_of(entry.type);
+  if (entry.codec != LSP_CODEC_NONE || kind == kKinds) {
+    json["stored"] = hex(data.data(), data.size());
+    return json;
+  }
+  const Struct* owner = element_struct(static_cast<Kind>(kind));
+  if (owner != nullptr) {
+    json["elements"] = Json::array();
+    for (size_t i = 0; i < data.size(); i += owner->bytes)
+      json["elements"].push_back(struct_of(*owner, data.data() + i));
+  } else if (static_cast<Kind>(kind) == Kind::kCand) {
+    json["words"] = Json::array();
+    for (size_t i = 0; i < data.size(); i += 4) json["words"].push_back(word(data.data() + i));
+  } else {
+    json["json"] = std::string(reinterpret_cast<const char*>(data.data()), data.size());
+  }
+  return json;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 2) return 1;
+  try {
+    const MappedFile file(argv[1]);
+    const FileView view = view_file(file.bytes());
+    Json json;
+    json["header"] = struct_of(struct_named("LspHeader"), file.bytes().data());
+    json["sections"] = Json::array();
+    for (const LspSection& entry : view.table) json["sections"].push_back(section_of(entry, file.bytes()));
+    std::puts(json.dump().c_str());
+    return 0;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "lsp_format_dump: %s: %s\n", argv[1], error.what());
+    return 2;
+  }
+}
