@@ -247,7 +247,8 @@ Baked bake(const Mesh& mesh, const BakeOptions& options, const Progress& progres
     h.line_space_depth = options.line_space.depths.back();
     h.line_space_triangles = options.line_space.triangles;
     const LineSpaces& ls = baked.line_spaces;
-    baked.skipped.push_back("empty shafts: " + with_commas(ls.shafts - ls.filled) + " of " + with_commas(ls.shafts));
+    baked.skipped.push_back("empty shafts: " + with_commas(ls.shafts - ls.filled) + " of " +
+                            with_commas(ls.shafts));
     if (ls.dropped) baked.skipped.push_back("Line Spaces without a filled shaft: " + with_commas(ls.dropped));
   } else {
     baked.skipped.push_back("Line Spaces: not asked for");
@@ -258,15 +259,17 @@ Baked bake(const Mesh& mesh, const BakeOptions& options, const Progress& progres
     const size_t nodes = baked.nodes.size(), triangles = baked.triangles.size();
     ApproximateOnly(baked).run();
     baked.skipped.push_back("nodes below Line Spaces: " + with_commas(nodes - baked.nodes.size()));
-    baked.skipped.push_back("triangles no shaft refers to: " + with_commas(triangles - baked.triangles.size()));
+    baked.skipped.push_back("triangles no shaft refers to: " +
+                            with_commas(triangles - baked.triangles.size()));
   }
 
-  h.required_features = (options.exact ? LSP_FEATURE_EXACT : 0) |
-                        (baked.line_spaces.records.empty() ? 0 : LSP_FEATURE_LINE_SPACES) |
-                        (normals ? LSP_FEATURE_NORMALS : 0) | (shading ? LSP_FEATURE_MATERIALS : 0) |
-                        (!baked.line_spaces.records.empty() && options.line_space.kind == LineSpaceKind::kBinary
-                             ? LSP_FEATURE_BINARY
-                             : 0);
+  h.required_features =
+      (options.exact ? LSP_FEATURE_EXACT : 0) |
+      (baked.line_spaces.records.empty() ? 0 : LSP_FEATURE_LINE_SPACES) |
+      (normals ? LSP_FEATURE_NORMALS : 0) | (shading ? LSP_FEATURE_MATERIALS : 0) |
+      (!baked.line_spaces.records.empty() && options.line_space.kind == LineSpaceKind::kBinary
+           ? LSP_FEATURE_BINARY
+           : 0);
   h.node_count = uint32_t(baked.nodes.size());
   h.triangle_count = uint32_t(baked.triangles.size());
   h.line_space_count = uint32_t(baked.line_spaces.records.size());

@@ -25,13 +25,13 @@ enum class Purpose {
 
 struct BakeOptions {
   Purpose purpose = Purpose::kAll;
-  bool exact = true;         // keep the tree below the Line Spaces and every triangle
+  bool exact = true;  // keep the tree below the Line Spaces and every triangle
   bool line_spaces = true;
   BvhOptions bvh;
   LineSpaceOptions line_space;
-  float plane_tolerance = 0.0f;        // LspHeader.plane_tolerance
+  float plane_tolerance = 0.0f;         // LspHeader.plane_tolerance
   float normal_angle_degrees = 180.0f;  // LspHeader.normal_angle_cos; 180: no hit is rejected
-  uint64_t memory_limit = 0;           // bytes, 0: none
+  uint64_t memory_limit = 0;            // bytes, 0: none
 };
 
 // The sections of a file, and the header but for what the writer knows (sizes, offsets, hashes).
@@ -42,7 +42,7 @@ struct Baked {
   std::vector<LspCornerNormals> normals;  // empty: no section
   std::vector<LspMaterial> materials;     // empty: no section
   LineSpaces line_spaces;
-  std::vector<std::string> skipped;       // what the scene did not need, in words
+  std::vector<std::string> skipped;  // what the scene did not need, in words
   double tree_seconds = 0;
   double line_space_seconds = 0;
 };

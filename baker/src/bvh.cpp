@@ -71,14 +71,17 @@ class Builder {
       bounds.grow(references[i].box);
     }
     root_area_ = bounds.half_area();
-    const size_t spare = options_.spatial_splits ? size_t(double(references.size()) * options_.split_budget) : 0;
+    const size_t spare =
+        options_.spatial_splits ? size_t(double(references.size()) * options_.split_budget) : 0;
     auto root = std::make_unique<TreeNode>();
     build_node(*root, std::move(references), spare, 0);
     return root;
   }
 
  private:
-  const glm::vec3& corner(uint32_t triangle, int c) const { return mesh_.positions[mesh_.triangles[triangle][c]]; }
+  const glm::vec3& corner(uint32_t triangle, int c) const {
+    return mesh_.positions[mesh_.triangles[triangle][c]];
+  }
 
   void build_node(TreeNode& node, std::vector<Reference> references, size_t spare, uint32_t depth) {
     for (const Reference& r : references) node.box.grow(r.box);
@@ -95,8 +98,8 @@ class Builder {
         spatial = find_spatial_split(references, node.box);
       const double area = node.box.half_area();
       const double leaf_cost = options_.triangle_cost * double(count) * area;
-      const bool use_spatial =
-          spatial.cost < object.cost && spatial.left + spatial.right <= count + spare && spatial.left && spatial.right;
+      const bool use_spatial = spatial.cost < object.cost && spatial.left + spatial.right <= count + spare &&
+                               spatial.left && spatial.right;
       const double split_cost = options_.traversal_cost * area + (use_spatial ? spatial.cost : object.cost);
       if (count <= options_.max_leaf_triangles && leaf_cost <= split_cost) return make_leaf(node, references);
       if (use_spatial) {
@@ -119,7 +122,8 @@ class Builder {
     std::vector<Reference>().swap(references);
     const size_t added = left.size() + right.size() - count;
     spare -= std::min(spare, added);
-    const size_t spare_left = size_t(double(spare) * double(left.size()) / double(left.size() + right.size()));
+    const size_t spare_left =
+        size_t(double(spare) * double(left.size()) / double(left.size() + right.size()));
     const size_t spare_right = spare - spare_left;
     node.child[0] = std::make_unique<TreeNode>();
     node.child[1] = std::make_unique<TreeNode>();
@@ -133,7 +137,8 @@ class Builder {
       build_node(*node.child[1], std::move(right), spare_right, depth + 1);
     }
     // Any-hit rays take child 0 first: a hit is likeliest in the larger one.
-    if (node.child[1]->box.half_area() > node.child[0]->box.half_area()) std::swap(node.child[0], node.child[1]);
+    if (node.child[1]->box.half_area() > node.child[0]->box.half_area())
+      std::swap(node.child[0], node.child[1]);
   }
 
   void make_leaf(TreeNode& node, const std::vector<Reference>& references) {
@@ -180,8 +185,8 @@ class Builder {
     return best;
   }
 
-  void split_objects(const std::vector<Reference>& references, const ObjectSplit& split, std::vector<Reference>& left,
-                     std::vector<Reference>& right) const {
+  void split_objects(const std::vector<Reference>& references, const ObjectSplit& split,
+                     std::vector<Reference>& left, std::vector<Reference>& right) const {
     Box centroids;
     for (const Reference& r : references) centroids.grow(r.box.centre());
     const Binning bin(centroids.lo[split.axis], centroids.hi[split.axis]);
@@ -189,8 +194,8 @@ class Builder {
       (bin(r.box.centre()[split.axis]) < split.bin ? left : right).push_back(r);
   }
 
-  // The parts of a reference's box on both sides of a plane that cuts it: bounds of the triangle's corners and
-  // of its edges' intersections with the plane, inside the reference's own box.
+  // The parts of a reference's box on both sides of a plane that cuts it: bounds of the triangle's corners
+  // and of its edges' intersections with the plane, inside the reference's own box.
   void cut(const Reference& r, int axis, float plane, Box& left, Box& right) const {
     left = Box();
     right = Box();
@@ -327,7 +332,8 @@ class Flattener {
       const uint32_t count = uint32_t(node.triangles.size());
       const uint32_t first = uint32_t(bvh_.records.size());
       if (size_t(first) + count > LSP_LEAF_FIRST_MASK)
-        throw Failure(Exit::kLimit, "", "the tree needs more than 134,217,727 triangle records, split the input");
+        throw Failure(Exit::kLimit, "",
+                      "the tree needs more than 134,217,727 triangle records, split the input");
       bvh_.records.insert(bvh_.records.end(), node.triangles.begin(), node.triangles.end());
       bvh_.max_leaf_triangles = std::max(bvh_.max_leaf_triangles, count);
       ++bvh_.leaf_count;

@@ -26,12 +26,12 @@ class Chooser {
   }
 
   // Returns the subtree's records as [first, end).
-  std::pair<uint32_t, uint32_t> visit(uint32_t child, const lsp_float3& lo, const lsp_float3& hi, uint32_t depth,
-                                      bool covered) {
+  std::pair<uint32_t, uint32_t> visit(uint32_t child, const lsp_float3& lo, const lsp_float3& hi,
+                                      uint32_t depth, bool covered) {
     const uint32_t count = count_records(child);
     const bool small = !covered && depth <= last_depth_ && count < options_.triangles;
-    const bool at_depth = !is_leaf(child) && std::find(options_.depths.begin(), options_.depths.end(), depth) !=
-                                                 options_.depths.end();
+    const bool at_depth = !is_leaf(child) && std::find(options_.depths.begin(), options_.depths.end(),
+                                                       depth) != options_.depths.end();
     size_t site = SIZE_MAX;
     if ((small || at_depth) && !covered) {
       site = sites.size();
@@ -83,8 +83,8 @@ struct Filled {
 };
 
 // The point of a patch at (x, y) in [0, 1)^2 of it. Faces and patches are numbered as in lsp/layout.h.
-glm::vec3 patch_point(const glm::vec3& lo, const glm::vec3& hi, uint32_t face, uint32_t patch, uint32_t n, float x,
-                      float y) {
+glm::vec3 patch_point(const glm::vec3& lo, const glm::vec3& hi, uint32_t face, uint32_t patch, uint32_t n,
+                      float x, float y) {
   const int axis = int(face / 2);
   const int u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;
   glm::vec3 p;
@@ -119,8 +119,8 @@ std::vector<Sample> shaft_samples(uint32_t count) {
 // centroid of its end patch hits first (paper, section 3.1).
 class Filler {
  public:
-  Filler(const Bvh& bvh, const LspHeader& header, std::span<const LspTriangle> triangles, const LineSpaceSite& site,
-         const LineSpaceOptions& options)
+  Filler(const Bvh& bvh, const LspHeader& header, std::span<const LspTriangle> triangles,
+         const LineSpaceSite& site, const LineSpaceOptions& options)
       : header_(header), options_(options), site_(site) {
     header_.root = site.child;
     header_.root_line_space = LSP_NONE;
@@ -165,8 +165,8 @@ class Filler {
   }
 
  private:
-  // The shafts from one patch to all patches of one face. The first rays of a shaft often settle it: all miss,
-  // or one plane answers them all; only the other shafts are given the remaining samples.
+  // The shafts from one patch to all patches of one face. The first rays of a shaft often settle it: all
+  // miss, or one plane answers them all; only the other shafts are given the remaining samples.
   void fill_row(uint32_t in, uint32_t p, uint32_t out, const std::vector<Sample>& samples,
                 const lsp_trace_options& trace, uint32_t* row) {
     const uint32_t n = options_.resolution, patches = n * n;
@@ -241,20 +241,27 @@ class Filler {
     const uint32_t shafts = uint32_t(hit.size());
     const uint32_t filled = uint32_t(shafts - size_t(std::count(hit.begin(), hit.end(), LSP_NONE)));
     const bool binary = options_.kind == LineSpaceKind::kBinary;
-    const uint32_t bytes = binary ? 0 : site_.triangle_count < 0xFF ? 1 : site_.triangle_count < 0xFFFF ? 2 : 4;
+    const uint32_t bytes = binary                          ? 0
+                           : site_.triangle_count < 0xFF   ? 1
+                           : site_.triangle_count < 0xFFFF ? 2
+                                                           : 4;
     const uint32_t word_count = (shafts + 31) / 32;
     // Section 3.1: the sparse layout costs two words per 32 shafts, the dense one an entry per empty shaft.
-    const bool dense =
-        !binary && uint64_t(shafts) * bytes < uint64_t(word_count) * sizeof(LspBitWord) + uint64_t(filled) * bytes;
+    const bool dense = !binary && uint64_t(shafts) * bytes <
+                                      uint64_t(word_count) * sizeof(LspBitWord) + uint64_t(filled) * bytes;
 
     Filled result;
     const glm::vec3 scale = float(n) / (hi_ - lo_);
-    result.record = {f3(lo_),       0,
-                     f3(hi_),       0,
-                     f3(scale),     site_.triangle_first,
+    result.record = {f3(lo_),
+                     0,
+                     f3(hi_),
+                     0,
+                     f3(scale),
+                     site_.triangle_first,
                      n | bytes << LSP_FORMAT_ENTRY_SHIFT | (dense ? LSP_FORMAT_DENSE : 0) |
                          (binary ? LSP_FORMAT_SYMMETRIC : 0),
-                     filled,        site_.triangle_count,
+                     filled,
+                     site_.triangle_count,
                      site_.child};
     if (!dense) {
       result.words.resize(word_count);
@@ -295,7 +302,8 @@ class Filler {
 
 }  // namespace
 
-std::vector<LineSpaceSite> choose_sites(const Bvh& bvh, const LspHeader& header, const LineSpaceOptions& options) {
+std::vector<LineSpaceSite> choose_sites(const Bvh& bvh, const LspHeader& header,
+                                        const LineSpaceOptions& options) {
   if (bvh.root == LSP_NONE || options.depths.empty()) return {};
   Chooser chooser(bvh, options);
   chooser.visit(bvh.root, header.bounds_min, header.bounds_max, 0, false);
@@ -328,8 +336,10 @@ LineSpaces fill_line_spaces(Bvh& bvh, RootReference& root, const LspHeader& head
       ++all.dropped;
       continue;
     }
-    if (all.words.size() + f.words.size() > LSP_NONE || all.candidates.size() + f.candidates.size() > LSP_NONE)
-      throw Failure(Exit::kLimit, "", "the Line Spaces need more than 2^32 words, lower --resolution or --depth");
+    if (all.words.size() + f.words.size() > LSP_NONE ||
+        all.candidates.size() + f.candidates.size() > LSP_NONE)
+      throw Failure(Exit::kLimit, "",
+                    "the Line Spaces need more than 2^32 words, lower --resolution or --depth");
     f.record.word_first = f.words.empty() ? 0 : uint32_t(all.words.size());
     f.record.candidate_first = f.candidates.empty() ? 0 : uint32_t(all.candidates.size());
     all.words.insert(all.words.end(), f.words.begin(), f.words.end());
@@ -337,7 +347,8 @@ LineSpaces fill_line_spaces(Bvh& bvh, RootReference& root, const LspHeader& head
     all.shafts += shafts;
     all.filled += f.record.filled;
     all.dense += (f.record.format & LSP_FORMAT_DENSE) ? 1 : 0;
-    references.emplace_back(sites[i].child, uint32_t(all.records.size()) | (sites[i].terminal ? LSP_TERMINAL_BIT : 0));
+    references.emplace_back(sites[i].child,
+                            uint32_t(all.records.size()) | (sites[i].terminal ? LSP_TERMINAL_BIT : 0));
     all.records.push_back(f.record);
     f = {};
   }

@@ -21,12 +21,12 @@ enum class LineSpaceKind {
 
 struct LineSpaceOptions {
   LineSpaceKind kind = LineSpaceKind::kCandidates;
-  uint32_t resolution = 6;            // N: patches along an edge of the box, 1 to LSP_MAX_RESOLUTION
+  uint32_t resolution = 6;             // N: patches along an edge of the box, 1 to LSP_MAX_RESOLUTION
   std::vector<uint32_t> depths = {9};  // D: inner nodes at these depths carry a Line Space (the root is at 0)
   // Rays per shaft that choose its candidate: 1 is the paper's centroid ray, more pick the triangle (or none)
   // whose plane answers all of them best.
   uint32_t samples = 5;
-  uint32_t triangles = 0;             // T: so does a node above the last depth with fewer triangles than this
+  uint32_t triangles = 0;  // T: so does a node above the last depth with fewer triangles than this
 };
 
 // A node that carries a Line Space.
@@ -54,13 +54,15 @@ struct RootReference {
 };
 
 // The nodes of `bvh` that are to carry a Line Space, in depth-first order.
-std::vector<LineSpaceSite> choose_sites(const Bvh& bvh, const LspHeader& header, const LineSpaceOptions& options);
+std::vector<LineSpaceSite> choose_sites(const Bvh& bvh, const LspHeader& header,
+                                        const LineSpaceOptions& options);
 
 // Computes the Line Space of every site on all threads of the current oneTBB arena and writes the references
 // into `bvh.nodes` and `root`. `triangles` are the tree's records. The result does not depend on the number
 // of threads. `progress` is called with the share done, from any thread.
 LineSpaces fill_line_spaces(Bvh& bvh, RootReference& root, const LspHeader& header,
                             std::span<const LspTriangle> triangles, const std::vector<LineSpaceSite>& sites,
-                            const LineSpaceOptions& options, const std::function<void(double)>& progress = {});
+                            const LineSpaceOptions& options,
+                            const std::function<void(double)>& progress = {});
 
 }  // namespace lsp

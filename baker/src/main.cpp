@@ -95,7 +95,8 @@ Json provenance(const Arguments& a, const Mesh& mesh, const std::array<uint64_t,
 Exit run(const Arguments& a) {
   if (a.exact && a.no_exact) throw Failure(Exit::kUsage, "", "--exact and --no-exact exclude each other");
   if (a.base == "ntree")
-    throw Failure(Exit::kUnsupported, "", "the base structure ntree is not built by this version, use --base bvh");
+    throw Failure(Exit::kUnsupported, "",
+                  "the base structure ntree is not built by this version, use --base bvh");
   if (a.no_line_spaces && a.no_exact)
     throw Failure(Exit::kUsage, "", "--no-line-spaces with --no-exact leaves nothing to trace");
   std::unique_ptr<tbb::global_control> control;
@@ -175,7 +176,8 @@ Exit run(const Arguments& a) {
   } else if (!a.common.quiet) {
     std::printf("read        %" PRIu64 " triangles, kept %zu\n", mesh.primitive_count, mesh.triangles.size());
     if (mesh.rejected.total())
-      std::printf("dropped     %" PRIu64 " degenerate, %" PRIu64 " non-finite, %" PRIu64 " with an index out of range\n",
+      std::printf("dropped     %" PRIu64 " degenerate, %" PRIu64 " non-finite, %" PRIu64
+                  " with an index out of range\n",
                   mesh.rejected.degenerate, mesh.rejected.non_finite, mesh.rejected.out_of_range);
     for (const std::string& note : mesh.notes) std::printf("note        %s\n", note.c_str());
     std::printf("tree        %u nodes, %u triangle records, depth %u\n", baked.header.node_count,
@@ -185,7 +187,8 @@ Exit run(const Arguments& a) {
                   100.0 * double(ls.filled) / double(std::max<uint64_t>(1, ls.shafts)));
     for (const std::string& s : baked.skipped) std::printf("skipped     %s\n", s.c_str());
     std::printf("time        import %.2f s, tree %.2f s, Line Spaces %.2f s, write %.2f s; peak memory %s\n",
-                import_seconds, baked.tree_seconds, baked.line_space_seconds, write_seconds, megabytes(peak).c_str());
+                import_seconds, baked.tree_seconds, baked.line_space_seconds, write_seconds,
+                megabytes(peak).c_str());
     for (const WrittenSection& s : written.sections) {
       std::printf("section     %s %12s", s.name.c_str(), megabytes(s.bytes).c_str());
       if (s.stored_bytes != s.bytes) std::printf(", packed %s", megabytes(s.stored_bytes).c_str());
@@ -208,11 +211,13 @@ int main(int argc, char** argv) {
   app.add_option("--base", a.base, "Base structure")->check(CLI::IsMember({"bvh", "ntree"}));
   app.add_option("--resolution", a.resolution, "N: patches along an edge of a Line Space's box")
       ->check(CLI::Range(1u, LSP_MAX_RESOLUTION));
-  app.add_option("--depth", a.depths, "D: depth of the nodes with a Line Space; several, as 6,9,12, give levels of detail")
+  app.add_option("--depth", a.depths,
+                 "D: depth of the nodes with a Line Space; several, as 6,9,12, give levels of detail")
       ->delimiter(',')
       ->check(CLI::Range(0u, 40u));
   app.add_option("--triangles", a.triangles, "T: nodes above D with fewer triangles get a Line Space too");
-  app.add_option("--samples", a.samples, "Rays that choose a shaft's candidate; 1: the centroid ray alone, as the paper does")
+  app.add_option("--samples", a.samples,
+                 "Rays that choose a shaft's candidate; 1: the centroid ray alone, as the paper does")
       ->check(CLI::Range(1u, 64u));
   app.add_option("--for", a.purpose, "What the file is for")
       ->transform(CLI::CheckedTransformer(std::map<std::string, Purpose>{{"visibility", Purpose::kVisibility},
@@ -225,13 +230,15 @@ int main(int argc, char** argv) {
   app.add_flag("--no-exact", a.no_exact, "Keep only what approximate rays need");
   app.add_flag("--no-line-spaces", a.no_line_spaces, "Bake the exact tree alone");
   app.add_option("--compress", a.compress, "Pack the sections")->check(CLI::IsMember({"none", "zstd"}));
-  app.add_option("--align", a.align, "Alignment of sections in bytes")->check(CLI::IsMember({256, 4096, 65536}));
+  app.add_option("--align", a.align, "Alignment of sections in bytes")
+      ->check(CLI::IsMember({256, 4096, 65536}));
   app.add_option("--threads", a.threads, "Threads, 0: all cores");
   app.add_option("--memory-limit", a.memory_limit, "Memory the bake may use, as 2GiB; 0: no limit")
       ->transform(CLI::AsSizeValue(false));
-  app.add_option("--normal-angle", a.normal_angle,
-                 "Reject a plane hit whose extrapolated normal is further from the candidate's mean normal, in "
-                 "degrees; 180: never")
+  app.add_option(
+         "--normal-angle", a.normal_angle,
+         "Reject a plane hit whose extrapolated normal is further from the candidate's mean normal, in "
+         "degrees; 180: never")
       ->check(CLI::Range(0.0f, 180.0f));
   app.add_option("--plane-tolerance", a.plane_tolerance,
                  "How far outside its box a plane hit may lie, in diagonals of the box")

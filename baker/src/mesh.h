@@ -27,15 +27,15 @@ struct Rejected {
 };
 
 struct Mesh {
-  std::vector<glm::vec3> positions;                    // world space, welded where the input shares them
-  std::vector<glm::uvec3> triangles;                   // indices into positions, all in range
-  std::vector<uint32_t> primitives;                    // per triangle: number in import order
-  std::vector<std::array<glm::vec3, 3>> normals;       // per triangle and corner, unit length
-  std::vector<uint32_t> material_ids;                  // per triangle, index into materials
-  std::vector<Material> materials;                     // never empty
-  uint64_t primitive_count = 0;                        // triangles in import order, rejected ones included
-  Rejected rejected;                                   // triangles.size() + rejected.total() = primitive_count
-  std::vector<std::string> notes;                      // what was skipped or assumed, for the report
+  std::vector<glm::vec3> positions;               // world space, welded where the input shares them
+  std::vector<glm::uvec3> triangles;              // indices into positions, all in range
+  std::vector<uint32_t> primitives;               // per triangle: number in import order
+  std::vector<std::array<glm::vec3, 3>> normals;  // per triangle and corner, unit length
+  std::vector<uint32_t> material_ids;             // per triangle, index into materials
+  std::vector<Material> materials;                // never empty
+  uint64_t primitive_count = 0;                   // triangles in import order, rejected ones included
+  Rejected rejected;                              // triangles.size() + rejected.total() = primitive_count
+  std::vector<std::string> notes;                 // what was skipped or assumed, for the report
 };
 
 }  // namespace lsp

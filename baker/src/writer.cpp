@@ -23,7 +23,9 @@ struct Section {
   bool required;
   std::span<const std::byte> bytes;
   std::vector<std::byte> packed;
-  std::span<const std::byte> stored() const { return packed.empty() ? bytes : std::span<const std::byte>(packed); }
+  std::span<const std::byte> stored() const {
+    return packed.empty() ? bytes : std::span<const std::byte>(packed);
+  }
 };
 
 uint64_t align_up(uint64_t x, uint64_t alignment) { return (x + alignment - 1) / alignment * alignment; }
@@ -31,7 +33,8 @@ uint64_t align_up(uint64_t x, uint64_t alignment) { return (x + alignment - 1) /
 std::vector<std::byte> compress(std::span<const std::byte> bytes, int level) {
   const std::unique_ptr<ZSTD_CCtx, size_t (*)(ZSTD_CCtx*)> context(ZSTD_createCCtx(), ZSTD_freeCCtx);
   std::vector<std::byte> out(ZSTD_compressBound(bytes.size()));
-  const size_t size = ZSTD_compressCCtx(context.get(), out.data(), out.size(), bytes.data(), bytes.size(), level);
+  const size_t size =
+      ZSTD_compressCCtx(context.get(), out.data(), out.size(), bytes.data(), bytes.size(), level);
   if (ZSTD_isError(size)) throw Failure(Exit::kInternal, "", std::string("zstd: ") + ZSTD_getErrorName(size));
   out.resize(size);
   return out;
@@ -93,8 +96,9 @@ class TemporaryFile {
     (void)!fchmod(fd_, 0666 & ~mask);
   }
   [[noreturn]] void fail(const char* what) {
-    throw Failure(Exit::kFile, path_.string(),
-                  std::string(what) + ": " + std::strerror(errno) + "; give another place with -o or make room");
+    throw Failure(
+        Exit::kFile, path_.string(),
+        std::string(what) + ": " + std::strerror(errno) + "; give another place with -o or make room");
   }
 
   std::filesystem::path path_, temporary_;
@@ -107,10 +111,11 @@ class TemporaryFile {
 Written write_lsp(const std::filesystem::path& path, Baked& baked, const std::string& meta,
                   const WriteOptions& options) {
   std::vector<Section> sections;
-  const auto add = [&](const char* name, uint32_t type, uint32_t element_bytes, bool required, const void* data,
-                       size_t bytes) {
+  const auto add = [&](const char* name, uint32_t type, uint32_t element_bytes, bool required,
+                       const void* data, size_t bytes) {
     if (bytes == 0) return;
-    sections.push_back({name, type, element_bytes, required, {static_cast<const std::byte*>(data), bytes}, {}});
+    sections.push_back(
+        {name, type, element_bytes, required, {static_cast<const std::byte*>(data), bytes}, {}});
   };
   const auto add_vector = [&](const char* name, uint32_t type, bool required, const auto& v) {
     add(name, type, uint32_t(sizeof v[0]), required, v.data(), v.size() * sizeof v[0]);
@@ -151,9 +156,9 @@ Written write_lsp(const std::filesystem::path& path, Baked& baked, const std::st
     const XXH128_hash_t hash = XXH3_128bits(s.bytes.data(), s.bytes.size());
     const uint64_t count = s.bytes.size() / s.element_bytes;
     position = align_up(position, alignment);
-    table.push_back({s.type, s.required ? LSP_SECTION_REQUIRED : 0u, position, s.stored().size(), s.bytes.size(),
-                     s.packed.empty() ? LSP_CODEC_NONE : LSP_CODEC_ZSTD, s.element_bytes, count, hash.low64,
-                     hash.high64});
+    table.push_back({s.type, s.required ? LSP_SECTION_REQUIRED : 0u, position, s.stored().size(),
+                     s.bytes.size(), s.packed.empty() ? LSP_CODEC_NONE : LSP_CODEC_ZSTD, s.element_bytes,
+                     count, hash.low64, hash.high64});
     content.push_back({s.type, s.element_bytes, count, s.bytes.size(), hash.low64, hash.high64});
     position += s.stored().size();
   }

@@ -17,7 +17,7 @@ using namespace lsp::subset;
 namespace lsp::counting {
 using namespace lsp::subset;
 #define LSP_COUNT
-#define LSP_COUNTS_PARAM , LspCounts &counts
+#define LSP_COUNTS_PARAM , LspCounts& counts
 #define LSP_COUNTS_ARG , counts
 #include "lsp/traverse.h"
 }  // namespace lsp::counting
@@ -49,8 +49,10 @@ void trace_counting(const lsp_scene& scene, uint32_t flags, float lod, const Lsp
 }
 
 using TraceLoop = void (*)(const lsp_scene&, float, const LspRay*, LspHit*, uint64_t);
-constexpr TraceLoop kLoops[8] = {trace_plain<0>, trace_plain<1>, trace_plain<2>, trace_plain<3>,
-                                 trace_plain<4>, trace_plain<5>, trace_plain<6>, trace_plain<7>};
+constexpr uint32_t kExactFlags = LSP_TRACE_ANY_HIT;  // what an exact trace heeds
+constexpr TraceLoop kLoops[16] = {trace_plain<0>, trace_plain<1>, trace_plain<2>, trace_plain<3>,
+                                  nullptr,        trace_plain<5>, nullptr,        trace_plain<7>,
+                                  nullptr,        trace_plain<9>, nullptr,        trace_plain<11>};
 
 lsp_status refuse(lsp_error* error, const char* message) {
   if (error) {
@@ -70,7 +72,8 @@ extern "C" lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options*
     return refuse(error, "the file has no Line Spaces, trace it exactly or bake it without --no-line-spaces");
   if (!approximate && !(features & LSP_FEATURE_EXACT))
     return refuse(error, "the file has no exact tree, trace it approximately or bake it without --no-exact");
-  const uint32_t flags = options->flags & 7u;
+  uint32_t flags = options->flags & (approximate ? LSP_TRACE_ALL_FLAGS : kExactFlags);
+  if (flags & LSP_TRACE_NEAR_APPROXIMATE) flags &= ~LSP_TRACE_NEAR_SKIP;
   if (counts)
     trace_counting(*scene, flags, options->lod, rays, hits, count, *counts);
   else

@@ -11,6 +11,7 @@
 
 namespace lsp::subset {
 
+using glm::vec2;
 using glm::vec3;
 using uint = uint32_t;
 

@@ -51,7 +51,7 @@ void define(CLI::App& app, Options& options) {
          "Stop at a Line Space once its diagonal is under THETA times the distance; 0: only at the deepest")
       ->check(CLI::Range(0.0f, 1e6f));
   app.add_option("--near", options.near, "How to answer where a Line Space's node holds the ray's origin")
-      ->check(CLI::IsMember({"exact", "approximate"}));
+      ->check(CLI::IsMember({"exact", "skip", "approximate"}));
   app.add_option("--repeat", options.repeats, "Times to trace all rays")->check(CLI::Range(1u, 1000000u));
   app.add_option("--threads", options.threads, "Threads of the CPU backend; all without it")
       ->check(CLI::Range(1u, 65536u));
@@ -76,6 +76,7 @@ TraceRequest make_request(const Options& options, const LspHeader& header) {
   if (approximate) request.options.flags |= LSP_TRACE_APPROXIMATE;
   if (options.query == "any") request.options.flags |= LSP_TRACE_ANY_HIT;
   if (options.near == "approximate") request.options.flags |= LSP_TRACE_NEAR_APPROXIMATE;
+  if (options.near == "skip") request.options.flags |= LSP_TRACE_NEAR_SKIP;
   request.options.lod = options.lod;
   request.vulkan = options.backend == "vulkan";
   request.repeats = options.repeats;

@@ -45,6 +45,7 @@ Mesh import_meshes(std::span<const std::filesystem::path> inputs, const ImportOp
     } catch (const std::bad_alloc&) {
       throw Failure(Exit::kLimit, path.string(), "needs more memory to import than there is, split the mesh");
     }
+    budget.settle(builder.allocated_bytes());
     const uint64_t count = builder.mesh().primitive_count - count_before;
     if (count == 0) {
       throw Failure(Exit::kInvalid, path.string(), "holds no triangle, give a file with a mesh in it");

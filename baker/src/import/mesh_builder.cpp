@@ -51,6 +51,13 @@ void MeshBuilder::check_count(const std::string& file, uint64_t more) const {
   }
 }
 
+uint64_t MeshBuilder::allocated_bytes() const {
+  const auto bytes = [](const auto& vector) { return vector.capacity() * sizeof(vector[0]); };
+  return bytes(mesh_.positions) + bytes(mesh_.triangles) + bytes(mesh_.primitives) + bytes(mesh_.normals) +
+         bytes(mesh_.material_ids) + 2 * bytes(mesh_.materials) + bytes(slots_) + bytes(welded_) +
+         bytes(unsmooth_);
+}
+
 void MeshBuilder::begin(const std::string& file, std::span<const glm::vec3> positions,
                         uint64_t triangle_count, MissingNormals missing) {
   check_count(file, triangle_count);

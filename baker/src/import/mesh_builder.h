@@ -43,6 +43,8 @@ class MeshBuilder {
   uint32_t default_material();
   void note(const std::string& text);
   Budget& budget() { return budget_; }
+  // What the mesh so far and its welding keep allocated.
+  uint64_t allocated_bytes() const;
 
   // Throws Failure kLimit where `more` triangles would not fit the 32-bit primitive numbers.
   void check_count(const std::string& file, uint64_t more) const;

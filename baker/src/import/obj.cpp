@@ -21,8 +21,6 @@ class ObjReader {
 
   void read() {
     const std::string text = read_text(path_, builder_.budget());
-    // From above: a face "f 1 1 1" is 8 bytes and becomes 32, in vectors that grow by doubling.
-    builder_.budget().charge(file_, text.size(), 8);
     std::string_view rest = text, line;
     std::string joined;
     while (take_line(rest, line)) {
@@ -55,20 +53,26 @@ class ObjReader {
     if (!take_word(line, word)) return;
     if (word == "v") {
       const glm::vec3 position = read_vector(line);
-      soup_.positions.push_back(position);
+      push(soup_.positions, position);
       std::string_view more;
       colored_ = colored_ || (take_word(line, more) && take_word(line, more));
     } else if (word == "vn") {
-      soup_.normals.push_back(read_vector(line));
+      push(soup_.normals, read_vector(line));
     } else if (word == "f" || word == "fo") {
       read_face(line);
     } else if (word == "usemtl") {
       use_material(trim(line));
     } else if (word == "mtllib") {
+      builder_.budget().charge(file_, line.size() + 128);
       libraries_.emplace_back(trim(line));
     } else if (word == "l" || word == "p" || word == "curv" || word == "curv2" || word == "surf") {
       ++other_elements_;
     }
+  }
+
+  template <typename T>
+  void push(std::vector<T>& vector, const T& value) {
+    builder_.budget().push_back(file_, vector, value);
   }
 
   // What is not there is NaN: a vertex that takes part in a face then has the face refused by name.
@@ -93,23 +97,26 @@ class ObjReader {
     while (take_word(line, word)) {
       if (word.front() == '#') break;
       const size_t slash = word.find('/');
-      soup_.corners.push_back(resolve(word.substr(0, slash), soup_.positions.size()));
+      push(soup_.corners, resolve(word.substr(0, slash), soup_.positions.size()));
       uint32_t normal = kNoIndex;
       if (slash != word.npos) {
         const size_t second = word.find('/', slash + 1);
         if (second != word.npos) normal = resolve(word.substr(second + 1), soup_.normals.size());
       }
       if (normal != kNoIndex || !soup_.corner_normals.empty()) {
-        soup_.corner_normals.resize(soup_.corners.size() - 1, kNoIndex);
-        soup_.corner_normals.push_back(normal);
+        while (soup_.corner_normals.size() + 1 < soup_.corners.size()) push(soup_.corner_normals, kNoIndex);
+        push(soup_.corner_normals, normal);
       }
     }
-    if (soup_.end_face()) soup_.materials.push_back(material_);
+    if (soup_.end_face(file_, builder_.budget())) push(soup_.materials, material_);
   }
 
   void use_material(std::string_view name) {
     const auto [at, fresh] = names_.try_emplace(std::string(name), uint32_t(used_.size()));
-    if (fresh) used_.push_back(at->first);
+    if (fresh) {
+      builder_.budget().charge(file_, 2 * name.size() + 256);
+      used_.push_back(at->first);
+    }
     material_ = at->second;
   }
 

@@ -49,12 +49,11 @@ class OffReader {
     read_header();
     const uint64_t vertex_count = read_count("vertices"), face_count = read_count("faces");
     words_.skip_line();  // the number of edges, often missing and never needed
-    // A vertex takes at least six bytes, a face four; the vectors below grow by doubling.
+    // A vertex takes at least six bytes, a face two.
     if (vertex_count > text_bytes_ / 6 + 1 || face_count > text_bytes_ / 2 + 1) {
       throw Failure(Exit::kInvalid, file_,
                     "declares more vertices or faces than its bytes can hold: export it again");
     }
-    builder_.budget().charge(file_, text_bytes_, 8);
     for (uint64_t i = 0; i < vertex_count; ++i) read_vertex();
     for (uint64_t i = 0; i < face_count; ++i) read_face();
     if (colored_) builder_.note(file_ + ": colours are not used");
@@ -63,6 +62,11 @@ class OffReader {
   }
 
  private:
+  template <typename T>
+  void push(std::vector<T>& vector, const T& value) {
+    builder_.budget().push_back(file_, vector, value);
+  }
+
   std::string_view word() {
     std::string_view word;
     if (!words_.next(word))
@@ -118,11 +122,11 @@ class OffReader {
     glm::dvec3 position;
     for (int i = 0; i < 3; ++i) position[i] = number_of(word());
     if (homogeneous_) position /= number_of(word());
-    soup_.positions.emplace_back(position);
+    push(soup_.positions, glm::vec3(position));
     if (has_normals_) {
       glm::vec3 normal;
       for (int i = 0; i < 3; ++i) normal[i] = float(number_of(word()));
-      soup_.normals.push_back(normal);
+      push(soup_.normals, normal);
     }
     colored_ = words_.skip_line() || colored_;
   }
@@ -133,11 +137,11 @@ class OffReader {
     for (uint64_t i = 0; i < count; ++i) {
       int64_t index = -1;
       const bool good = integer_of(word(), index) && index >= 0 && index < int64_t{kNoIndex};
-      soup_.corners.push_back(good ? uint32_t(index) : kNoIndex);
-      if (has_normals_) soup_.corner_normals.push_back(soup_.corners.back());
+      push(soup_.corners, good ? uint32_t(index) : kNoIndex);
+      if (has_normals_) push(soup_.corner_normals, soup_.corners.back());
     }
     colored_ = words_.skip_line() || colored_;
-    soup_.end_face();
+    soup_.end_face(file_, builder_.budget());
   }
 
   const std::string file_;

@@ -233,8 +233,6 @@ class PlyReader {
       : file_(file), body_(body), builder_(builder) {}
 
   void read(const Header& header) {
-    // The tightest list holds an index in one byte; it becomes four in a vector that grows by doubling.
-    builder_.budget().charge(file_, body_.left(), 8);
     for (const Element& element : header.elements) {
       has_normals_ = has_normals_ || (element.name == "vertex" && holds_normals(element));
     }
@@ -303,8 +301,9 @@ class PlyReader {
     if (element.count >= kNoIndex - soup_.positions.size()) {
       throw Failure(Exit::kLimit, file_, "holds more than 2^32 - 2 vertices, split the mesh");
     }
-    soup_.positions.reserve(element.count);
-    if (has_normals_) soup_.normals.reserve(element.count);
+    builder_.budget().charge(file_, element.count, (has_normals_ ? 2 : 1) * sizeof(glm::vec3));
+    soup_.positions.reserve(soup_.positions.size() + element.count);
+    if (has_normals_) soup_.normals.reserve(soup_.normals.size() + element.count);
     const size_t count = element.properties.size();
     for (uint64_t i = 0; i < element.count; ++i) {
       glm::vec3 vectors[2] = {};
@@ -348,7 +347,7 @@ class PlyReader {
           }
           const uint32_t corner = index >= 0 && index < int64_t{kNoIndex} ? uint32_t(index) : kNoIndex;
           if (strips) {
-            strip.push_back(corner);
+            push(strip, corner);
           } else {
             add_corner(corner);
           }
@@ -356,26 +355,30 @@ class PlyReader {
         if (strips) {
           end_strip(strip);
         } else {
-          soup_.end_face();
+          soup_.end_face(file_, builder_.budget());
         }
       }
       body_.end_element();
     }
   }
 
+  template <typename T>
+  void push(std::vector<T>& vector, const T& value) {
+    builder_.budget().push_back(file_, vector, value);
+  }
+
   void add_corner(uint32_t corner) {
-    soup_.corners.push_back(corner);
-    if (has_normals_) soup_.corner_normals.push_back(corner);
+    push(soup_.corners, corner);
+    if (has_normals_) push(soup_.corner_normals, corner);
   }
 
   // A strip's triangle k is (k, k+1, k+2), every second one turned round.
   void end_strip(std::vector<uint32_t>& strip) {
-    if (strip.size() > 2) builder_.budget().charge(file_, strip.size() - 2, 2 * 7 * sizeof(uint32_t));
     for (size_t k = 0; k + 2 < strip.size(); ++k) {
       add_corner(strip[k]);
       add_corner(strip[k + 1 + k % 2]);
       add_corner(strip[k + 2 - k % 2]);
-      soup_.end_face();
+      soup_.end_face(file_, builder_.budget());
     }
     strip.clear();
   }

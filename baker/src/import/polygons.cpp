@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "lsp/program.h"
+
 namespace lsp {
 namespace {
 
@@ -61,7 +63,7 @@ bool is_ear(std::span<const glm::dvec2> flat, std::span<const uint32_t> ring, si
 
 }  // namespace
 
-bool PolygonSoup::end_face() {
+bool PolygonSoup::end_face(const std::string& file, Budget& budget) {
   const size_t begin = face_ends.empty() ? 0 : face_ends.back();
   if (corners.size() - begin < 3) {
     ++too_small;
@@ -69,7 +71,9 @@ bool PolygonSoup::end_face() {
     if (!corner_normals.empty()) corner_normals.resize(begin);
     return false;
   }
-  face_ends.push_back(uint32_t(corners.size()));
+  if (corners.size() >= kNoIndex)
+    throw Failure(Exit::kLimit, file, "holds more than 2^32 - 2 corners, split the mesh");
+  budget.push_back(file, face_ends, uint32_t(corners.size()));
   return true;
 }
 

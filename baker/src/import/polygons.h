@@ -24,7 +24,7 @@ struct PolygonSoup {
 
   // Ends a face whose corners were appended since the last one. One with fewer than three is dropped and
   // counted: it holds no triangle. True where it was kept.
-  bool end_face();
+  bool end_face(const std::string& file, Budget& budget);
   uint64_t triangle_count() const;
 };
 

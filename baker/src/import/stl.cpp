@@ -32,16 +32,6 @@ bool looks_ascii(std::string_view bytes) {
   return false;
 }
 
-void add_triangle(PolygonSoup& soup, const glm::vec3& normal, const glm::vec3* corners) {
-  for (int i = 0; i < 3; ++i) {
-    soup.corners.push_back(uint32_t(soup.positions.size()));
-    soup.positions.push_back(corners[i]);
-    soup.corner_normals.push_back(uint32_t(soup.normals.size()));
-  }
-  soup.normals.push_back(normal);
-  soup.end_face();
-}
-
 void read_binary(const std::string& file, std::string_view bytes, uint32_t count, PolygonSoup& soup,
                  MeshBuilder& builder) {
   constexpr uint64_t kSoupBytes = 4 * sizeof(glm::vec3) + 7 * sizeof(uint32_t);
@@ -54,7 +44,13 @@ void read_binary(const std::string& file, std::string_view bytes, uint32_t count
   for (size_t i = 0; i < count; ++i) {
     glm::vec3 vectors[4];
     std::memcpy(vectors, bytes.data() + kHeaderBytes + i * kTriangleBytes, sizeof vectors);
-    add_triangle(soup, vectors[0], vectors + 1);
+    for (int k = 1; k < 4; ++k) {
+      soup.corners.push_back(uint32_t(soup.positions.size()));
+      soup.positions.push_back(vectors[k]);
+      soup.corner_normals.push_back(uint32_t(i));
+    }
+    soup.normals.push_back(vectors[0]);
+    soup.end_face(file, builder.budget());
   }
 }
 
@@ -68,22 +64,21 @@ glm::vec3 read_vector(std::string_view line) {
 // Keywords at the start of lines, in any case: any number of solids, their names free text. A loop with more
 // than three vertices is taken as a polygon.
 void read_ascii(const std::string& file, std::string_view text, PolygonSoup& soup, MeshBuilder& builder) {
-  // "vertex 1 1 1" is 13 bytes and becomes 20, in vectors that grow by doubling.
-  builder.budget().charge(file, text.size(), 5);
+  Budget& budget = builder.budget();
   std::string_view line, word;
   uint32_t normal = kNoIndex;
   while (take_line(text, line)) {
     if (!take_word(line, word)) continue;
     if (equals_ignoring_case(word, "vertex")) {
-      soup.corners.push_back(uint32_t(soup.positions.size()));
-      soup.positions.push_back(read_vector(line));
-      soup.corner_normals.push_back(normal);
+      budget.push_back(file, soup.corners, uint32_t(soup.positions.size()));
+      budget.push_back(file, soup.positions, read_vector(line));
+      budget.push_back(file, soup.corner_normals, normal);
     } else if (equals_ignoring_case(word, "facet")) {
       normal = uint32_t(soup.normals.size());
       take_word(line, word);  // "normal"
-      soup.normals.push_back(read_vector(line));
+      budget.push_back(file, soup.normals, read_vector(line));
     } else if (equals_ignoring_case(word, "endfacet")) {
-      soup.end_face();
+      soup.end_face(file, budget);
       normal = kNoIndex;
     }
   }

@@ -100,6 +100,12 @@ lsp_status lsp_unpack(const void* bytes, uint64_t size, void* out, uint64_t out_
  * happens to files whose declared bounds are wrong; on a device also where it cuts long loops short. */
 #define LSP_HIT_INCOMPLETE 0x80000000u
 
+/* Where the origin lies inside a Line Space: first ask the shaft of the opposite direction for the last surface
+ * on the ray's line, and trace exactly only when that lies ahead. Saves most of the exact work near the origin
+ * for a small error; ignored with LSP_TRACE_NEAR_APPROXIMATE. */
+#define LSP_TRACE_NEAR_SKIP 0x8u
+#define LSP_TRACE_ALL_FLAGS 0xFu
+
 typedef struct lsp_trace_options {
   uint32_t flags; /* LSP_TRACE_* */
   float lod; /* theta: stop at a Line Space once its box's diagonal is under lod * distance; 0: deepest only */
