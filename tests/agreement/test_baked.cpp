@@ -1,0 +1,162 @@
+// CPU and Vulkan on files as the baker writes them: a room made here, and meshes from the scenes' folder.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+
+#include "bake.h"
+#include "import/import.h"
+#include "lsp/lsp.h"
+#include "lsp/scene_file.hpp"
+#include "lsp/vulkan_device.hpp"
+#include "scene_builder.h"
+#include "writer.h"
+
+namespace lsp::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A box seen from inside with a bumpy ball in it.
+Mesh make_room() {
+  Mesh mesh;
+  const auto add = [&](const glm::vec3& a, const glm::vec3& b, const glm::vec3& c,
+                       const std::array<glm::vec3, 3>& n) {
+    const auto first = static_cast<uint32_t>(mesh.positions.size());
+    mesh.positions.insert(mesh.positions.end(), {a, b, c});
+    mesh.triangles.emplace_back(first, first + 1, first + 2);
+    mesh.primitives.push_back(static_cast<uint32_t>(mesh.primitive_count++));
+    mesh.normals.push_back(n);
+    mesh.material_ids.push_back(0);
+  };
+  const auto flat = [&](const glm::vec3& a, const glm::vec3& b, const glm::vec3& c, const glm::vec3& d) {
+    const glm::vec3 n = glm::normalize(glm::cross(b - a, c - a));
+    add(a, b, c, {n, n, n});
+    add(a, c, d, {n, n, n});
+  };
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const float side : {-2.0f, 2.0f}) {
+      const auto corner = [&](float u, float v) {
+        glm::vec3 p;
+        p[axis] = side;
+        p[(axis + 1) % 3] = u;
+        p[(axis + 2) % 3] = v;
+        return p;
+      };
+      flat(corner(-2, -2), corner(2, -2), corner(2, 2), corner(-2, 2));
+    }
+  }
+  constexpr int kRings = 60;
+  const auto ball = [](int i, int j) {
+    const float theta = 3.14159265f * static_cast<float>(i) / kRings;
+    const float phi = 3.14159265f * static_cast<float>(j % (2 * kRings)) / kRings;
+    const float r = 1.0f + 0.1f * std::sin(7 * theta) * std::cos(5 * phi);
+    return glm::vec3(r * std::sin(theta) * std::cos(phi), r * std::sin(theta) * std::sin(phi),
+                     r * std::cos(theta));
+  };
+  for (int i = 0; i < kRings; ++i) {
+    for (int j = 0; j < 2 * kRings; ++j) {
+      const glm::vec3 a = ball(i, j), b = ball(i + 1, j), c = ball(i + 1, j + 1), d = ball(i, j + 1);
+      const auto n = [](const glm::vec3& p) { return glm::normalize(p); };
+      if (i + 1 < kRings) add(a, b, c, {n(a), n(b), n(c)});
+      if (i > 0) add(a, c, d, {n(a), n(c), n(d)});
+    }
+  }
+  mesh.materials.emplace_back();
+  return mesh;
+}
+
+// Rays as indirect light sends them: from points of the surfaces into all directions.
+std::vector<LspRay> surface_rays(const lsp_scene& scene, uint32_t count) {
+  Random random(21);
+  const LspHeader& h = *scene.header;
+  const float size = std::hypot(h.bounds_max.x - h.bounds_min.x, h.bounds_max.y - h.bounds_min.y);
+  std::vector<LspRay> rays;
+  for (uint32_t i = 0; i < count && h.triangle_count != 0; ++i) {
+    const LspTriangle& t = scene.triangles[random.below(h.triangle_count)];
+    const float u = random.uniform();
+    const float v = random.uniform() * (1 - u);
+    const auto at = [&](float a, float b, float c) { return a + (b - a) * u + (c - a) * v; };
+    const lsp_float3 d{random.between(-1, 1), random.between(-1, 1), random.between(-1, 1)};
+    const float up = 1e-4f * size;
+    rays.push_back({{at(t.v0.x, t.v1.x, t.v2.x) + up * d.x, at(t.v0.y, t.v1.y, t.v2.y) + up * d.y,
+                     at(t.v0.z, t.v1.z, t.v2.z) + up * d.z},
+                    0,
+                    d,
+                    INFINITY});
+  }
+  return rays;
+}
+
+class Baked : public testing::TestWithParam<const char*> {
+ protected:
+  void SetUp() override {
+    std::string why;
+    if (!VulkanTracer::available(&why)) GTEST_SKIP() << why;
+    path_ = (fs::temp_directory_path() / ("lsp_test_baked_" + std::to_string(getpid()) + ".lsp")).string();
+  }
+  void TearDown() override {
+    if (!path_.empty()) fs::remove(path_);
+  }
+
+  void bake_and_compare(const Mesh& mesh, Purpose purpose, bool exact, uint32_t depth) {
+    BakeOptions options;
+    options.purpose = purpose;
+    options.exact = exact;
+    options.line_space.resolution = 4;
+    options.line_space.depths = {depth / 2, depth};
+    lsp::Baked baked = bake(mesh, options);
+    write_lsp(path_, baked, "{}", {});
+    const SceneFile file(path_);
+    const std::vector<LspRay> rays = surface_rays(file.scene(), 20000);
+    std::vector<LspHit> cpu(rays.size());
+    std::vector<LspHit> gpu(rays.size());
+    VulkanTracer tracer;
+    tracer.load(file.scene(), LSP_USE_APPROXIMATE | (exact ? LSP_USE_EXACT : 0));
+    constexpr uint32_t kApproximate = LSP_TRACE_APPROXIMATE;
+    for (const uint32_t flags : {0u, LSP_TRACE_ANY_HIT, kApproximate, kApproximate | LSP_TRACE_ANY_HIT,
+                                 kApproximate | LSP_TRACE_NEAR_APPROXIMATE}) {
+      if (!exact && (flags & kApproximate) == 0) continue;
+      for (const float lod : {0.0f, 0.5f}) {
+        SCOPED_TRACE("flags " + std::to_string(flags) + " lod " + std::to_string(lod));
+        const lsp_trace_options trace{flags, lod};
+        lsp_error error;
+        ASSERT_EQ(lsp_trace(&file.scene(), &trace, rays.data(), cpu.data(), rays.size(), nullptr, &error),
+                  LSP_OK)
+            << error.message;
+        tracer.trace(trace, rays, gpu);
+        size_t different = 0;
+        for (size_t i = 0; i < rays.size(); ++i)
+          different += memcmp(&cpu[i], &gpu[i], sizeof(LspHit)) == 0 ? 0 : 1;
+        EXPECT_EQ(different, 0u);
+      }
+    }
+  }
+  std::string path_;
+};
+
+TEST_P(Baked, Room) {
+  const std::string what = GetParam();
+  const Mesh mesh = make_room();
+  if (what == "all") bake_and_compare(mesh, Purpose::kAll, true, 6);
+  if (what == "ao") bake_and_compare(mesh, Purpose::kAo, true, 6);
+  if (what == "visibility") bake_and_compare(mesh, Purpose::kVisibility, true, 6);
+  if (what == "approximate_only") bake_and_compare(mesh, Purpose::kAll, false, 6);
+}
+INSTANTIATE_TEST_SUITE_P(For, Baked, testing::Values("all", "ao", "visibility", "approximate_only"),
+                         [](const auto& info) { return std::string(info.param); });
+
+using BakedScene = Baked;
+TEST_P(BakedScene, Agrees) {
+  const fs::path mesh = fs::path(LSP_SCENES_DIR) / GetParam();
+  if (!fs::exists(mesh)) GTEST_SKIP() << mesh << " is not there";
+  bake_and_compare(import_meshes(std::array{mesh}, {}), Purpose::kAll, true, 7);
+}
+INSTANTIATE_TEST_SUITE_P(Of, BakedScene, testing::Values("paper/bunny.ply", "paper/sibenik.obj"),
+                         [](const auto& info) { return fs::path(info.param).stem().string(); });
+
+}  // namespace
+}  // namespace lsp::test
