@@ -1,8 +1,10 @@
 // lsp-render: a picture of an .lsp file, its indirect light traced exactly or approximately.
+#include <tbb/global_control.h>
 #include <unistd.h>
 
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "../command_line.h"
 #include "lsp/lsp_vulkan.h"
@@ -76,6 +78,11 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
   const Sky sky = parse_sun(arguments.sun);
   Camera camera = arguments.camera.empty() ? Camera{} : parse_camera(arguments.camera);
 
+  // Without this oneTBB would never use more threads than there are cores.
+  std::optional<tbb::global_control> allowed;
+  if (options.threads > 0) {
+    allowed.emplace(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(options.threads));
+  }
   const RenderScene scene(arguments.file);
   if (options.approximate && !scene.has_line_spaces()) {
     throw Failure(Exit::kUnsupported, arguments.file,

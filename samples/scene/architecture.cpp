@@ -218,7 +218,7 @@ Surface baluster(const Detail& detail, float height) {
   const float h = height;
   Surface s = box({-0.065f, 0, -0.065f}, {0.065f, 0.07f * h, 0.065f});
   Profile body;
-  const int steps = detail.steps(10, 2);
+  const int steps = detail.steps(9, 2);
   for (int i = 0; i <= steps; ++i) {
     const float t = static_cast<float>(i) / static_cast<float>(steps);
     // A vase: narrow foot, belly at a third, slender neck, flared top.

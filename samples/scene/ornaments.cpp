@@ -60,10 +60,10 @@ Surface tied_curtain(const Detail& detail, float width, float length, int seed) 
     const float tie = 0.60f;
     const float open = v < tie ? 1.0f - smooth(0.0f, 1.0f, std::pow(v / tie, 1.6f)) : 0.0f;
     const float flare = v > tie ? smooth(tie, 1.0f, v) : 0.0f;
-    const float spread = width * (0.12f + 0.88f * open) + 0.16f * width * flare;
+    const float spread = width * (0.22f + 0.78f * open) + 0.16f * width * flare;
     const float gather = 1.0f - open;
     const float fold =
-        (0.05f + 0.035f * gather) * std::sin(kTau * 6.0f * u + phase + 0.8f * std::sin(3.0f * v));
+        (0.05f - 0.015f * gather) * std::sin(kTau * 5.0f * u + phase + 0.8f * std::sin(3.0f * v));
     const float droop =
         0.22f * length * u * gather * (1.0f - flare) * smooth(0.1f, tie, v) * (1.0f - u * 0.4f);
     const float x = 0.04f + u * spread;
@@ -99,16 +99,16 @@ Surface torus_knot(const Detail& detail, int p, int q) {
 
 Surface gyroid_sphere(const Detail& detail) {
   const auto field = [](glm::vec3 p) {
-    const glm::vec3 q = p * 7.2f;
+    const glm::vec3 q = p * 4.6f;
     const float gyroid =
         std::sin(q.x) * std::cos(q.y) + std::sin(q.y) * std::cos(q.z) + std::sin(q.z) * std::cos(q.x);
-    const float sheet = (std::abs(gyroid) - 0.34f) / 7.2f;
+    const float sheet = (std::abs(gyroid) - 0.55f) / 4.6f;
     const float ball = glm::length(p) - 1.0f;
     const float hollow = 0.42f - glm::length(p);
     // Smooth intersections, so that rims are rounded.
-    return -smooth_min(smooth_min(-sheet, -ball, 0.06f), -hollow, 0.06f);
+    return -smooth_min(smooth_min(-sheet, -ball, 0.12f), -hollow, 0.12f);
   };
-  return implicit(field, -1.13f, 1.13f, detail.steps(24, 5));
+  return implicit(field, -1.13f, 1.13f, detail.steps(29, 5));
 }
 
 Surface coral(const Detail& detail) {
@@ -130,17 +130,21 @@ Surface twisted_vase(const Detail& detail) {
   return tessellate(
       detail.steps(52, 8), detail.steps(26, 6),
       [](float u, float v) {
-        // Outside from the foot to the lip for v in [0, 0.6], then down the inside to the bottom.
-        const bool outside = v < 0.6f;
-        const float t = outside ? v / 0.6f : 1.0f - (v - 0.6f) / 0.4f;
-        const float height = outside ? t : 0.08f + 0.92f * t;
-        const float foot = outside ? smooth(0.0f, 0.05f, v) : smooth(0.0f, 0.06f, 1.0f - v);
+        // Outside from the foot to the lip, over the lip in a half circle, then down the inside to the
+        // bottom.
+        const float lip = glm::clamp((v - 0.50f) / 0.10f, 0.0f, 1.0f);
+        const float height = v < 0.50f   ? v / 0.50f
+                             : v < 0.60f ? 1.0f + 0.02f * std::sin(kPi * lip)
+                                         : 0.08f + 0.92f * (1.0f - (v - 0.60f) / 0.40f);
+        const float foot = smooth(0.0f, 0.05f, v) * smooth(0.0f, 0.06f, 1.0f - v);
+        const float inset = 0.02f * (1.0f - std::cos(kPi * lip));
+        const float level = std::min(height, 1.0f);
         const float body =
-            0.17f + 0.23f * std::sin(kPi * std::pow(height, 0.75f)) + 0.10f * smooth(0.80f, 1.0f, height);
+            0.17f + 0.23f * std::sin(kPi * std::pow(level, 0.75f)) + 0.10f * smooth(0.80f, 1.0f, level);
         const float angle = kTau * u;
-        const float turn = angle + 1.6f * height;
+        const float turn = angle + 1.6f * level;
         const float ribs = superformula(turn, 8.0f, 5.5f, 3.0f, 3.0f);
-        const float r = foot * (body * glm::mix(1.0f, ribs, 0.55f) - (outside ? 0.0f : 0.03f));
+        const float r = foot * (body * glm::mix(1.0f, ribs, 0.55f) - inset);
         return glm::vec3(r * std::sin(angle), height * 1.15f, r * std::cos(angle));
       },
       Closing::kSphere);
@@ -212,7 +216,7 @@ Surface fountain_water(const Detail& detail) {
   Surface s;
   const auto disc = [&](float radius, float height) {
     append(s, tessellate(
-                  detail.steps(48, 8), detail.steps(14, 2),
+                  detail.steps(44, 8), detail.steps(12, 2),
                   [=](float u, float v) {
                     const float r = radius * (1.0f - v);
                     const float y = height + 0.006f * std::sin(38.0f * r) * (0.4f + 0.6f * v) +
@@ -248,7 +252,7 @@ Surface pot(const Detail& detail) {
 
 Surface palm_leaves(const Detail& detail, int seed) {
   Surface leaves;
-  const int count = detail.shows(0.5f) ? 32 : 14;
+  const int count = detail.shows(0.5f) ? 30 : 14;
   for (int k = 0; k < count; ++k) {
     const float t = static_cast<float>(k) / static_cast<float>(count);
     // Golden-angle phyllotaxis: inner leaves stand, outer ones arch over.

@@ -9,10 +9,13 @@ namespace {
 
 constexpr float kPi = 3.14159265358979324f;
 
-// Adds a triangle unless two of its corners coincide.
+// Adds a triangle unless it has no area to speak of, as at the poles of a patch.
 void add_triangle(Surface& surface, uint32_t a, uint32_t b, uint32_t c) {
   const auto& p = surface.positions;
-  if (p[a] == p[b] || p[b] == p[c] || p[c] == p[a]) return;
+  const glm::vec3 ab = p[b] - p[a];
+  const glm::vec3 ac = p[c] - p[a];
+  const float longest = std::max({glm::dot(ab, ab), glm::dot(ac, ac), glm::dot(ac - ab, ac - ab)});
+  if (glm::length(glm::cross(ab, ac)) <= 1e-6f * longest) return;
   surface.indices.insert(surface.indices.end(), {a, b, c});
 }
 

@@ -45,9 +45,10 @@ class Programs : public ::testing::Test {
   static std::string file(const std::string& name) { return (folder_ / name).string(); }
 
   // Renders `scene` into NAME.pfm and reads it back.
-  static Picture render(const std::string& scene, const std::string& name, const std::string& options) {
+  static Picture render(const std::string& scene, const std::string& name, const std::string& options,
+                        int samples = 4) {
     EXPECT_EQ(run("lsp-render " + file(scene) + ".lsp -o " + file(name) +
-                  ".pfm --quiet --size 64x36 --samples 4 " + options),
+                  ".pfm --quiet --size 64x36 --samples " + std::to_string(samples) + " " + options),
               0);
     return read_pfm(file(name) + ".pfm");
   }
@@ -89,8 +90,8 @@ TEST_F(Programs, ApproximateIsCloseAndPrimaryRaysAreExact) {
   const Comparison direct = compare(render("spheres", "a", "--effect direct"),
                                     render("spheres", "b", "--effect direct --mode approximate"));
   EXPECT_EQ(direct.mean_absolute, 0.0) << "direct light is exact in both modes";
-  const Comparison all = compare(render("spheres", "a", "--effect all --samples 16"),
-                                 render("spheres", "b", "--effect all --samples 16 --mode approximate"));
+  const Comparison all = compare(render("spheres", "a", "--effect all", 16),
+                                 render("spheres", "b", "--effect all --mode approximate", 16));
   EXPECT_GT(all.psnr_db, 25.0);
   EXPECT_NEAR(all.mean_test / all.mean_reference, 1.0, 0.02);
 }

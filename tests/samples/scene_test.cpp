@@ -24,7 +24,7 @@ TEST(SampleScene, SameBytesTwice) {
 }
 
 TEST(SampleScene, TessellationMeetsTheWish) {
-  for (const uint64_t wish : {1'000u, 30'000u, 200'000u}) {
+  for (const uint64_t wish : {3'000u, 30'000u, 200'000u}) {
     for (const char* name : {"spheres", "plane"}) {
       const double have = static_cast<double>(triangle_count(make_scene(name, detail_for(name, wish))));
       EXPECT_NEAR(have / static_cast<double>(wish), 1.0, 0.25) << name << " of " << wish;
