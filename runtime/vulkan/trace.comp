@@ -11,8 +11,11 @@ layout(local_size_x = 64) in;
 layout(std430, set = 0, binding = 7) readonly buffer RayBuffer { uvec4 ray_words[]; };
 layout(std430, set = 0, binding = 8) writeonly buffer HitBuffer { uvec4 hit_words[]; };
 
+// The kind of trace is part of the pipeline: what it does not need (look-ups in an exact trace) is compiled
+// away, which matters most where a device runs both sides of every branch.
+layout(constant_id = 1) const uint kFlags = 0u;
+
 layout(push_constant) uniform Constants {
-  uint flags;
   float lod;
   uint first;
   uint count;
@@ -39,7 +42,7 @@ void main() {
   bool valid;
 #ifdef LSP_COUNT
   LspCounts counts = LspCounts(0u, 0u, 0u);
-  LspHit hit = lsp_trace_ray(ray, constants.flags, constants.lod, valid, counts);
+  LspHit hit = lsp_trace_ray(ray, kFlags, constants.lod, valid, counts);
   if ((hit.flags & LSP_HIT_INCOMPLETE) == 0u) {  // an incomplete ray is traced, and counted, again
     add(1u, valid ? 0u : 1u);
     add(2u, hit.primitive != LSP_NONE ? 1u : 0u);
@@ -48,7 +51,7 @@ void main() {
     add(5u, counts.triangles);
   }
 #else
-  LspHit hit = lsp_trace_ray(ray, constants.flags, constants.lod, valid);
+  LspHit hit = lsp_trace_ray(ray, kFlags, constants.lod, valid);
 #endif
 
   hit_words[2u * index] =

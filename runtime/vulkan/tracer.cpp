@@ -1,7 +1,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cstring>
-#include <optional>
+#include <map>
+#include <memory>
 
 #include "device.h"
 #include "scene_buffers.h"
@@ -41,8 +42,8 @@ class Shader {
   Shader(const Shader&) = delete;
   Shader& operator=(const Shader&) = delete;
 
-  // A pipeline whose stack has `stack` entries. The caller destroys it.
-  VkPipeline create_pipeline(bool counting, uint32_t stack) {
+  // A pipeline for traces with `flags` whose stack has `stack` entries. The caller destroys it.
+  VkPipeline create_pipeline(bool counting, uint32_t flags, uint32_t stack) {
     size_t bytes = 0;
     VkShaderModuleCreateInfo module_info{};
     module_info.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
@@ -51,8 +52,11 @@ class Shader {
     VkShaderModule module = VK_NULL_HANDLE;
     check(device_.vk.vkCreateShaderModule(device_.handle, &module_info, nullptr, &module),
           "vkCreateShaderModule");
-    const VkSpecializationMapEntry entry{LSP_VULKAN_STACK_CONSTANT, 0, sizeof stack};
-    const VkSpecializationInfo specialization{1, &entry, sizeof stack, &stack};
+    const uint32_t values[] = {stack, flags};
+    const VkSpecializationMapEntry entries[] = {
+        {LSP_VULKAN_STACK_CONSTANT, 0, sizeof(uint32_t)},
+        {LSP_VULKAN_FLAGS_CONSTANT, sizeof(uint32_t), sizeof(uint32_t)}};
+    const VkSpecializationInfo specialization{2, entries, sizeof values, values};
     VkComputePipelineCreateInfo info{};
     info.sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO;
     info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
@@ -144,19 +148,19 @@ class Shader {
   VkDescriptorPool pool_ = VK_NULL_HANDLE;
 };
 
-// The pipelines for one scene's stack, made when they are first needed.
+// The pipelines for one scene's stack, one for each kind of trace, made when they are first needed.
 class Pipelines {
  public:
   Pipelines(Device& device, Shader& shader, uint32_t stack)
       : device_(device), shader_(shader), stack_(stack) {}
   ~Pipelines() {
-    for (VkPipeline pipeline : made_) device_.vk.vkDestroyPipeline(device_.handle, pipeline, nullptr);
+    for (const auto& [key, pipeline] : made_) device_.vk.vkDestroyPipeline(device_.handle, pipeline, nullptr);
   }
   Pipelines(const Pipelines&) = delete;
   Pipelines& operator=(const Pipelines&) = delete;
-  VkPipeline get(bool counting) {
-    VkPipeline& pipeline = made_[counting ? 1 : 0];
-    if (pipeline == VK_NULL_HANDLE) pipeline = shader_.create_pipeline(counting, stack_);
+  VkPipeline get(bool counting, uint32_t flags) {
+    VkPipeline& pipeline = made_[{counting, flags}];
+    if (pipeline == VK_NULL_HANDLE) pipeline = shader_.create_pipeline(counting, flags, stack_);
     return pipeline;
   }
 
@@ -164,7 +168,7 @@ class Pipelines {
   Device& device_;
   Shader& shader_;
   uint32_t stack_;
-  VkPipeline made_[2]{};
+  std::map<std::pair<bool, uint32_t>, VkPipeline> made_;
 };
 
 // Rays and hits of one batch. Where device and host share memory the shader works on what the host writes; on
@@ -335,9 +339,9 @@ void VulkanTracer::Impl::record_batch(const lsp_trace_options& options, uint32_t
     vk.vkCmdResetQueryPool(commands, shader_->timer, 0, 2);
     vk.vkCmdWriteTimestamp(commands, kCompute, shader_->timer, 0);
   }
-  const lsp_vulkan_trace_constants constants{options.flags, options.lod, 0, count};
-  lsp_vulkan_record_trace(&device->functions, commands, pipelines_->get(counting), shader_->layout,
-                          shader_->set, &constants);
+  const lsp_vulkan_trace_constants constants{options.lod, 0, count};
+  lsp_vulkan_record_trace(&device->functions, commands, pipelines_->get(counting, options.flags),
+                          shader_->layout, shader_->set, &constants);
   if (shader_->timer != VK_NULL_HANDLE) vk.vkCmdWriteTimestamp(commands, kCompute, shader_->timer, 1);
   if (batch_.staged()) {
     record_barrier(*device, commands, kCompute, VK_ACCESS_SHADER_WRITE_BIT, kTransfer,

@@ -144,13 +144,14 @@ void lsp_vulkan_record_upload_barrier(const lsp_vulkan_functions* functions, VkC
 
 #define LSP_VULKAN_GROUP_SIZE 64u
 
-/* Specialization constant of the shader: entries of its stack, at least header->max_stack. Default 96. */
+/* Specialization constants of the shader, each a uint32_t. Stack: its entries, at least header->max_stack and
+ * 1, default 96. Flags: LSP_TRACE_*, default 0; a pipeline does one kind of trace. */
 #define LSP_VULKAN_STACK_CONSTANT 0u
+#define LSP_VULKAN_FLAGS_CONSTANT 1u
 
 /* Push constants, compute stage, from offset 0: rays [first, first + count) of the buffers. */
 typedef struct lsp_vulkan_trace_constants {
-  uint32_t flags; /* LSP_TRACE_* */
-  float lod;
+  float lod; /* as in lsp_trace_options */
   uint32_t first;
   uint32_t count;
 } lsp_vulkan_trace_constants;
