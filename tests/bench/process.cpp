@@ -3,14 +3,15 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <spawn.h>
-#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
+#include <fstream>
 
 #include "lsp/program.h"
 
@@ -34,6 +35,16 @@ struct Pipe {
     ends[k] = -1;
   }
 };
+
+// Peak resident set of a running process so far. The kernel's own figure at its end, ru_maxrss, is no use: it
+// starts from the size of the process that started it.
+uint64_t peak_of(pid_t process) {
+  std::ifstream status("/proc/" + std::to_string(process) + "/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.rfind("VmHWM:", 0) == 0) return std::stoull(line.substr(6)) * 1024;
+  }
+  return 0;
+}
 
 }  // namespace
 
@@ -59,7 +70,8 @@ ProcessResult run_process(const std::vector<std::string>& command) {
   std::array<pollfd, 2> polled = {pollfd{out.ends[0], POLLIN, 0}, pollfd{err.ends[0], POLLIN, 0}};
   std::array<std::string*, 2> sinks = {&result.output, &result.errors};
   while (polled[0].fd >= 0 || polled[1].fd >= 0) {
-    if (poll(polled.data(), polled.size(), -1) < 0 && errno != EINTR) break;
+    if (poll(polled.data(), polled.size(), 10) < 0 && errno != EINTR) break;
+    result.peak_bytes = std::max(result.peak_bytes, peak_of(child));
     for (size_t k = 0; k < 2; ++k) {
       if (polled[k].fd < 0 || polled[k].revents == 0) continue;
       char buffer[65536];
@@ -72,11 +84,9 @@ ProcessResult run_process(const std::vector<std::string>& command) {
     }
   }
   int status = 0;
-  rusage usage{};
-  while (wait4(child, &status, 0, &usage) < 0 && errno == EINTR) {
+  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  result.peak_bytes = static_cast<uint64_t>(usage.ru_maxrss) * 1024;
   result.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   return result;
 }

@@ -12,7 +12,7 @@ struct ProcessResult {
   std::string output;       // standard output
   std::string errors;       // standard error
   double seconds = 0;       // wall clock
-  uint64_t peak_bytes = 0;  // largest resident set
+  uint64_t peak_bytes = 0;  // largest resident set, looked at every 10 ms
 };
 
 // Runs `command` and waits. Throws Failure(kInternal) where it cannot be started.

@@ -43,10 +43,10 @@ std::vector<Mode> modes_for(const OpenFile& file, bool quick) {
   std::vector<Mode> modes = {{.approximate = true}, {.approximate = true, .near_approximate = true}};
   if (!has_levels(file)) return modes;
   if (quick) {
-    modes.push_back({.approximate = true, .lod = 0.1f});
+    modes.push_back({.approximate = true, .lod = 0.5f});
     return modes;
   }
-  for (const float lod : {0.03f, 0.06f, 0.12f, 0.25f, 0.5f})
+  for (const float lod : {0.1f, 0.2f, 0.4f, 0.8f, 1.6f})
     modes.push_back({.approximate = true, .lod = lod});
   return modes;
 }
