@@ -1,18 +1,18 @@
 // The tree: references, order, boxes, declared bounds, and the Line Space references beside them.
 //
-// A child's index is greater than its parent's, so one pass up the array sees every parent before its
-// children and one pass down sees every subtree whole: no recursion, no stack that a hostile file could
-// overflow.
+// A child's index is greater than its parent's, so one pass down the array, from the last node to the first,
+// sees every subtree whole before the node above it: no recursion, no stack that a hostile file could
+// overflow, and every node is touched while its children are still in the cache.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
+#include <memory>
 
 #include "layers.h"
 
 namespace lsp::format {
 namespace {
-
-constexpr uint32_t kNoParent = LSP_NONE;
 
 // A run [first, end) of triangles or Line Spaces that a subtree holds.
 struct Run {
@@ -31,8 +31,13 @@ struct Run {
 
 struct Subtree {
   uint32_t node_end = 0;  // one past its last node
+  uint32_t height = 0;    // edges to its deepest leaf
   Run triangles;
   Run line_spaces;
+};
+
+struct Box {
+  lsp_float3 lo, hi;
 };
 
 // One child of a node, or the root.
@@ -41,7 +46,21 @@ struct Slot {
   uint32_t line_space;
   uint64_t node;  // that holds it
   int side;       // 0 or 1; -1: the header's root
+  Box box;
+  bool empty() const { return child == LSP_NONE && line_space == LSP_NONE; }
 };
+
+// Whether `inner` lies in `outer` and neither is inside out; false where a number is NaN. With a finite outer
+// box, true says that the inner one is finite too. One branch for all twelve comparisons.
+inline bool nested(const Box& outer, const Box& inner) {
+  return static_cast<int>(outer.lo.x <= inner.lo.x) & static_cast<int>(outer.lo.y <= inner.lo.y) &
+         static_cast<int>(outer.lo.z <= inner.lo.z) & static_cast<int>(inner.lo.x <= inner.hi.x) &
+         static_cast<int>(inner.lo.y <= inner.hi.y) & static_cast<int>(inner.lo.z <= inner.hi.z) &
+         static_cast<int>(inner.hi.x <= outer.hi.x) & static_cast<int>(inner.hi.y <= outer.hi.y) &
+         static_cast<int>(inner.hi.z <= outer.hi.z);
+}
+
+bool finite(const lsp_float3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
 class TreeCheck {
  public:
@@ -54,27 +73,23 @@ class TreeCheck {
         exact_((header_.required_features & LSP_FEATURE_EXACT) != 0) {}
 
   void run() {
-    parent_slot_.assign(nodes_.size(), kNoParent);
-    depth_.assign(nodes_.size(), 0);
-    line_space_seen_.assign(header_.line_space_count <= line_spaces_.size() ? line_spaces_.size() : 0, false);
-    check_slot(root());
-    for (uint64_t i = 0; i < nodes_.size(); ++i) check_node(i);
-    check_bounds();
-    subtrees_.resize(nodes_.size());
-    for (uint64_t i = nodes_.size(); i-- > 0;) gather(i);
-    gather_root();
+    has_parent_.assign(nodes_.size(), false);
+    line_space_seen_.assign(line_spaces_.size(), false);
+    subtrees_ = std::make_unique_for_overwrite<Subtree[]>(nodes_.size());
+    for (uint64_t i = nodes_.size(); i-- > 0;) subtrees_[i] = check_node(i);
+    check_root();
     check_unused();
   }
 
  private:
-  Slot root() const { return {header_.root, header_.root_line_space, 0, -1}; }
   Slot slot(uint64_t i, int side) const {
     const LspNode& node = nodes_[i];
-    return side == 0 ? Slot{node.child0, node.line_space0, i, 0} : Slot{node.child1, node.line_space1, i, 1};
+    return side == 0 ? Slot{node.child0, node.line_space0, i, 0, {node.lo0, node.hi0}}
+                     : Slot{node.child1, node.line_space1, i, 1, {node.lo1, node.hi1}};
   }
 
   enum class Field { kChild, kLineSpace, kBox };
-  void find(RuleId id, const Slot& at, Field field, const std::string& message) {
+  [[gnu::cold]] void find(RuleId id, const Slot& at, Field field, const std::string& message) {
     static constexpr const char* kNames[2][3] = {{"child0", "line_space0", "lo0"},
                                                  {"child1", "line_space1", "lo1"}};
     static constexpr uint64_t kOffsets[3] = {offsetof(LspNode, child0), offsetof(LspNode, line_space0),
@@ -82,93 +97,129 @@ class TreeCheck {
     const int which = static_cast<int>(field);
     const uint64_t bytes = field == Field::kBox ? 28 : 4;  // lo, child, hi
     if (at.side < 0) {
-      report_.add(
-          id, field == Field::kLineSpace ? offsetof(LspHeader, root_line_space) : offsetof(LspHeader, root),
-          4, field == Field::kLineSpace ? "/header/root_line_space" : "/header/root", message);
+      const bool line_space = field == Field::kLineSpace;
+      report_.add(id, line_space ? offsetof(LspHeader, root_line_space) : offsetof(LspHeader, root), 4,
+                  line_space ? "/header/root_line_space" : "/header/root", message);
       return;
     }
     const uint64_t first = at.node * sizeof(LspNode) + 32u * static_cast<uint64_t>(at.side) + kOffsets[which];
     report_.add(id, view_.offset_of(Kind::kNode, first), view_.length_of(Kind::kNode, bytes),
                 element_path(Kind::kNode, at.node, kNames[at.side][which]), message);
   }
+  [[gnu::cold]] void find_node(RuleId id, uint64_t i, const char* message) {
+    report_.add(id, view_.offset_of(Kind::kNode, i * sizeof(LspNode)),
+                view_.length_of(Kind::kNode, sizeof(LspNode)), [&] {
+                  return std::pair{element_path(Kind::kNode, i), std::string(message)};
+                });
+  }
 
-  void check_node(uint64_t i) {
-    if (i != 0 && parent_slot_[i] == kNoParent)
-      report_.add(
-          RuleId::kUnreachable, view_.offset_of(Kind::kNode, i * sizeof(LspNode)),
-          view_.length_of(Kind::kNode, sizeof(LspNode)), [&] {
-            return std::pair{element_path(Kind::kNode, i), std::string("no node before it refers to it")};
-          });
-    deepest_ = std::max(deepest_, depth_[i] + 1);
+  Subtree check_node(uint64_t i) {
+    Subtree subtree;
+    subtree.node_end = static_cast<uint32_t>(i + 1);
     const Slot first = slot(i, 0), second = slot(i, 1);
-    check_slot(first);
-    check_slot(second);
-    if (first.child == LSP_NONE && second.child == LSP_NONE && first.line_space == LSP_NONE &&
-        second.line_space == LSP_NONE)
-      report_.add(RuleId::kNodeEmpty, view_.offset_of(Kind::kNode, i * sizeof(LspNode)),
-                  view_.length_of(Kind::kNode, sizeof(LspNode)), element_path(Kind::kNode, i),
-                  "has nothing below it");
-    const LspNode& node = nodes_[i];
-    check_box(first, node.lo0, node.hi0);
-    check_box(second, node.lo1, node.hi1);
+    if (first.empty() && second.empty()) [[unlikely]]
+      find_node(RuleId::kNodeEmpty, i, "has nothing below it");
+    check_slot(first, subtree);
+    check_slot(second, subtree);
+    return subtree;
   }
 
-  void check_slot(const Slot& at) {
+  // Checks a slot and adds it to the subtree of the node that holds it.
+  void check_slot(const Slot& at, Subtree& above) {
+    Subtree inside;
     if (at.child == LSP_NONE) {
-      if (at.line_space != LSP_NONE && exact_)
-        find(RuleId::kChildMissing, at, Field::kChild,
-             "nothing is below the Line Space, but the file is exact");
-      if (at.line_space != LSP_NONE) ++ends_;
+      if (at.line_space != LSP_NONE) inside.triangles = left_out(at);
     } else if (at.child & LSP_LEAF_BIT) {
-      check_leaf(at);
-    } else {
-      check_link(at);
+      inside.triangles = leaf(at);
+    } else if (link(at, above)) {
+      inside = subtrees_[at.child];
+      check_nesting(at);
     }
-    if (at.line_space != LSP_NONE) check_line_space_reference(at);
+    if (!at.empty()) above.height = std::max(above.height, inside.height + 1);
+    if (at.line_space != LSP_NONE) check_line_space(at, inside, above);
+    append_line_spaces(above, inside.line_spaces, at);
+    if (!above.triangles.append(inside.triangles)) [[unlikely]]
+      find(RuleId::kLeafOrder, at, Field::kChild,
+           "its triangles begin at " + std::to_string(inside.triangles.first) +
+               ", not where those before it end");
   }
 
-  void check_leaf(const Slot& at) {
+  // A subtree that was left out: its triangles are those of its Line Space.
+  Run left_out(const Slot& at) {
     ++ends_;
-    const uint64_t first = at.child & LSP_LEAF_FIRST_MASK;
-    const uint64_t count = (at.child >> LSP_LEAF_COUNT_SHIFT & LSP_LEAF_COUNT_MASK) + 1;
-    if (!in_range(first, count, header_.triangle_count) && at.side >= 0)
-      find(RuleId::kLeafOutOfRange, at, Field::kChild,
-           "triangles " + std::to_string(first) + " to " + std::to_string(first + count - 1) + " of " +
-               std::to_string(header_.triangle_count));
-    if (count > header_.max_leaf_triangles)
+    if (exact_) [[unlikely]]
+      find(RuleId::kChildMissing, at, Field::kChild,
+           "nothing is below the Line Space, but the file is exact");
+    return line_space_triangles(at.line_space & LSP_LINE_SPACE_MASK);
+  }
+
+  Run leaf(const Slot& at) {
+    ++ends_;
+    const uint32_t first = at.child & LSP_LEAF_FIRST_MASK;
+    const uint32_t count = (at.child >> LSP_LEAF_COUNT_SHIFT & LSP_LEAF_COUNT_MASK) + 1;
+    if (count > header_.max_leaf_triangles) [[unlikely]]
       find(RuleId::kLeafTooLarge, at, Field::kChild,
            std::to_string(count) + " triangles, max_leaf_triangles is " +
                std::to_string(header_.max_leaf_triangles));
+    if (in_range(first, count, header_.triangle_count)) [[likely]]
+      return {first, first + count};
+    if (at.side >= 0)  // the header's layer has checked the root
+      find(RuleId::kLeafOutOfRange, at, Field::kChild,
+           "triangles " + std::to_string(first) + " to " + std::to_string(first + count - 1) + " of " +
+               std::to_string(header_.triangle_count));
+    return {};
   }
 
-  // A reference to a node: notes the child's parent and depth, unless the reference is unsound.
-  void check_link(const Slot& at) {
-    if (at.side < 0) return;  // the header's layer has checked the root
-    if (at.child >= nodes_.size())
-      find(RuleId::kChildOutOfRange, at, Field::kChild,
-           "names node " + std::to_string(at.child) + " of " + std::to_string(nodes_.size()));
-    else if (at.child <= at.node)
-      find(RuleId::kChildNotAfterParent, at, Field::kChild,
-           "names node " + std::to_string(at.child) + ", which is not after its parent");
-    else if (parent_slot_[at.child] != kNoParent)
-      find(RuleId::kTwoParents, at, Field::kChild,
-           "names node " + std::to_string(at.child) + ", which node " +
-               std::to_string(parent_slot_[at.child] / 2) + " already has as a child");
-    else {
-      parent_slot_[at.child] = static_cast<uint32_t>(at.node * 2 + static_cast<uint64_t>(at.side));
-      depth_[at.child] = depth_[at.node] + 1;
+  // A reference to a node; false where it is unsound. `above` is the subtree so far.
+  bool link(const Slot& at, Subtree& above) {
+    if (at.side < 0) return !nodes_.empty() && at.child == 0;
+    if (at.child >= nodes_.size()) [[unlikely]]
+      return unsound(RuleId::kChildOutOfRange, at, " of " + std::to_string(nodes_.size()));
+    if (at.child <= at.node) [[unlikely]]
+      return unsound(RuleId::kChildNotAfterParent, at, ", which is not after its parent");
+    if (has_parent_[at.child]) [[unlikely]]
+      return unsound(RuleId::kTwoParents, at, ", which is the child of another node too");
+    has_parent_[at.child] = true;
+    if (at.child != above.node_end) [[unlikely]]
+      find(RuleId::kNotDepthFirst, at, Field::kChild,
+           "names node " + std::to_string(at.child) + ", depth-first order asks for " +
+               std::to_string(above.node_end));
+    above.node_end = std::max(above.node_end, subtrees_[at.child].node_end);
+    return true;
+  }
+  [[gnu::cold]] bool unsound(RuleId id, const Slot& at, const std::string& what) {
+    find(id, at, Field::kChild, "names node " + std::to_string(at.child) + what);
+    return false;
+  }
+
+  // The boxes inside a child that is a node, against the child's own.
+  void check_nesting(const Slot& at) {
+    for (int side : {0, 1}) {
+      const Slot inner = slot(at.child, side);
+      if (!nested(at.box, inner.box) && !inner.empty()) [[unlikely]]
+        explain_box(inner, at.box);
     }
   }
 
-  bool linked(const Slot& at) const {
-    return at.child < nodes_.size() && at.child > at.node &&
-           parent_slot_[at.child] == at.node * 2 + static_cast<uint64_t>(at.side);
+  [[gnu::cold]] void explain_box(const Slot& at, const Box& outer) {
+    const Box& box = at.box;
+    if (!finite(box.lo) || !finite(box.hi))
+      find(RuleId::kBoxNotFinite, at, Field::kBox, "a corner of the box is not finite");
+    else if (box.lo.x > box.hi.x || box.lo.y > box.hi.y || box.lo.z > box.hi.z)
+      find(RuleId::kBoxNotFinite, at, Field::kBox, "the box is inside out");
+    else if (finite(outer.lo) && finite(outer.hi))  // else the outer box has a finding of its own
+      find(RuleId::kBoxOutsideParent, at, Field::kBox, "the box reaches outside its parent's");
   }
 
-  void check_line_space_reference(const Slot& at) {
+  void check_line_space(const Slot& at, const Subtree& inside, Subtree& above) {
     const uint32_t index = at.line_space & LSP_LINE_SPACE_MASK;
+    const bool terminal = (at.line_space & LSP_TERMINAL_BIT) != 0;
+    if (terminal != inside.line_spaces.empty())
+      find(RuleId::kTerminalBit, at, Field::kLineSpace,
+           terminal ? "TERMINAL is set, but there are Line Spaces below"
+                    : "TERMINAL is clear, but no Line Space is below");
     if (index >= header_.line_space_count) {
-      if (at.side >= 0)
+      if (at.side >= 0)  // the header's layer has checked the root
         find(RuleId::kLineSpaceOutOfRange, at, Field::kLineSpace,
              "names Line Space " + std::to_string(index) + " of " + std::to_string(header_.line_space_count));
       return;
@@ -178,67 +229,27 @@ class TreeCheck {
       find(RuleId::kLineSpaceUsedTwice, at, Field::kLineSpace,
            "names Line Space " + std::to_string(index) + ", which another node carries");
     line_space_seen_[index] = true;
-    if (line_spaces_[index].child != at.child)
-      report_.add(RuleId::kLineSpaceChild,
-                  view_.offset_of(Kind::kLspc, index * sizeof(LspLineSpace) + offsetof(LspLineSpace, child)),
-                  view_.length_of(Kind::kLspc, 4), element_path(Kind::kLspc, index, "child"),
-                  "is not the child reference beside the reference to this Line Space");
+    const LspLineSpace& space = line_spaces_[index];
+    if (space.child != at.child)
+      find_line_space(RuleId::kLineSpaceChild, index, "child", offsetof(LspLineSpace, child),
+                      "is not the child reference beside the reference to this Line Space");
+    const Run own = line_space_triangles(index);
+    const bool within = in_range(space.triangle_first, space.triangle_count, header_.triangle_count) &&
+                        (own.empty() || at.child == LSP_NONE ||
+                         (own.first >= inside.triangles.first && own.end <= inside.triangles.end));
+    if (!within)
+      find_line_space(
+          RuleId::kLineSpaceTriangles, index, "triangle_first", offsetof(LspLineSpace, triangle_first),
+          std::to_string(space.triangle_count) + " triangles from " + std::to_string(space.triangle_first) +
+              " on, but the node has [" + std::to_string(inside.triangles.first) + ", " +
+              std::to_string(inside.triangles.end) + ")");
+    append_line_spaces(above, {index, index + 1}, at);
   }
 
-  void check_box(const Slot& at, const lsp_float3& lo, const lsp_float3& hi) {
-    if (at.child == LSP_NONE && at.line_space == LSP_NONE) return;
-    // A sum is finite only if every term is; overflow of finite terms is sorted out in the slow path.
-    const float sum = (lo.x + lo.y + lo.z) + (hi.x + hi.y + hi.z);
-    if (!std::isfinite(sum) && !(std::isfinite(lo.x) && std::isfinite(lo.y) && std::isfinite(lo.z) &&
-                                 std::isfinite(hi.x) && std::isfinite(hi.y) && std::isfinite(hi.z))) {
-      find(RuleId::kBoxNotFinite, at, Field::kBox, "a corner of the box is not finite");
-      return;
-    }
-    if (lo.x > hi.x || lo.y > hi.y || lo.z > hi.z) {
-      find(RuleId::kBoxNotFinite, at, Field::kBox, "the box is inside out");
-      return;
-    }
-    const lsp_float3 *outer_lo = &header_.bounds_min, *outer_hi = &header_.bounds_max;
-    if (const uint32_t parent = parent_slot_[at.node]; parent != kNoParent) {
-      const LspNode& node = nodes_[parent / 2];
-      outer_lo = parent % 2 == 0 ? &node.lo0 : &node.lo1;
-      outer_hi = parent % 2 == 0 ? &node.hi0 : &node.hi1;
-    }
-    if (lo.x < outer_lo->x || lo.y < outer_lo->y || lo.z < outer_lo->z || hi.x > outer_hi->x ||
-        hi.y > outer_hi->y || hi.z > outer_hi->z)
-      find(RuleId::kBoxOutsideParent, at, Field::kBox, "the box reaches outside its parent's");
-  }
-
-  void check_bounds() {
-    if (deepest_ > header_.max_depth)
-      report_.add(RuleId::kDepthExceeded, offsetof(LspHeader, max_depth), 4, "/header/max_depth",
-                  "is " + std::to_string(header_.max_depth) + ", but a leaf is " + std::to_string(deepest_) +
-                      " deep");
-    if (deepest_ > header_.max_stack)
-      report_.add(RuleId::kStackExceeded, offsetof(LspHeader, max_stack), 4, "/header/max_stack",
-                  "is " + std::to_string(header_.max_stack) + ", but a traversal may need " +
-                      std::to_string(deepest_));
-    if (nodes_.size() + ends_ > header_.max_steps)
-      report_.add(RuleId::kStepsExceeded, offsetof(LspHeader, max_steps), 4, "/header/max_steps",
-                  "is " + std::to_string(header_.max_steps) + ", but there are " +
-                      std::to_string(nodes_.size()) + " nodes and " + std::to_string(ends_) +
-                      " leaves or Line Spaces in place of them");
-  }
-
-  // What is below a slot; its own Line Space not counted.
-  Subtree below(const Slot& at) const {
-    if (at.side < 0 ? !nodes_.empty() : linked(at)) return subtrees_[at.side < 0 ? 0 : at.child];
-    Subtree result;
-    if (at.child == LSP_NONE) {
-      // A subtree that was left out: its triangles are those of its Line Space.
-      if (at.line_space != LSP_NONE)
-        result.triangles = line_space_triangles(at.line_space & LSP_LINE_SPACE_MASK);
-    } else if (at.child & LSP_LEAF_BIT) {
-      const uint32_t first = at.child & LSP_LEAF_FIRST_MASK;
-      const uint32_t count = (at.child >> LSP_LEAF_COUNT_SHIFT & LSP_LEAF_COUNT_MASK) + 1;
-      if (in_range(first, count, header_.triangle_count)) result.triangles = {first, first + count};
-    }
-    return result;
+  void find_line_space(RuleId id, uint64_t i, const char* field, uint64_t offset,
+                       const std::string& message) {
+    report_.add(id, view_.offset_of(Kind::kLspc, i * sizeof(LspLineSpace) + offset),
+                view_.length_of(Kind::kLspc, 4), element_path(Kind::kLspc, i, field), message);
   }
 
   Run line_space_triangles(uint32_t index) const {
@@ -248,67 +259,32 @@ class TreeCheck {
     return {space.triangle_first, space.triangle_first + space.triangle_count};
   }
 
-  // Adds a slot to the runs of the node above it, and checks what only a whole subtree can tell.
-  void gather_slot(const Slot& at, Subtree& above) {
-    const Subtree inside = below(at);
-    if (at.line_space != LSP_NONE) {
-      const uint32_t index = at.line_space & LSP_LINE_SPACE_MASK;
-      const bool terminal = (at.line_space & LSP_TERMINAL_BIT) != 0;
-      if (terminal != inside.line_spaces.empty())
-        find(RuleId::kTerminalBit, at, Field::kLineSpace,
-             terminal ? "TERMINAL is set, but there are Line Spaces below"
-                      : "TERMINAL is clear, but no Line Space is below");
-      if (index < line_spaces_.size()) {
-        const LspLineSpace& space = line_spaces_[index];
-        const Run own = line_space_triangles(index);
-        const bool within = in_range(space.triangle_first, space.triangle_count, header_.triangle_count) &&
-                            (own.empty() || at.child == LSP_NONE ||
-                             (own.first >= inside.triangles.first && own.end <= inside.triangles.end));
-        if (!within)
-          report_.add(RuleId::kLineSpaceTriangles,
-                      view_.offset_of(Kind::kLspc,
-                                      index * sizeof(LspLineSpace) + offsetof(LspLineSpace, triangle_first)),
-                      view_.length_of(Kind::kLspc, 4), element_path(Kind::kLspc, index, "triangle_first"),
-                      std::to_string(space.triangle_count) + " triangles from " +
-                          std::to_string(space.triangle_first) + " on, but the node has [" +
-                          std::to_string(inside.triangles.first) + ", " +
-                          std::to_string(inside.triangles.end) + ")");
-        append_line_spaces(above, {index, index + 1}, at);
-      }
-    }
-    append_line_spaces(above, inside.line_spaces, at);
-    if (!above.triangles.append(inside.triangles))
-      find(RuleId::kLeafOrder, at, Field::kChild,
-           "its triangles begin at " + std::to_string(inside.triangles.first) +
-               ", not where those before it end");
-  }
-
   void append_line_spaces(Subtree& above, Run next, const Slot& at) {
-    if (!above.line_spaces.append(next))
+    if (!above.line_spaces.append(next)) [[unlikely]]
       find(RuleId::kLineSpaceOrder, at, Field::kLineSpace,
            "Line Space " + std::to_string(next.first) +
                " does not follow the one before it in depth-first order");
   }
 
-  void gather(uint64_t i) {
-    Subtree& subtree = subtrees_[i];
-    subtree.node_end = static_cast<uint32_t>(i + 1);
-    for (int side : {0, 1}) {
-      const Slot at = slot(i, side);
-      if (linked(at)) {
-        if (at.child != subtree.node_end)
-          find(RuleId::kNotDepthFirst, at, Field::kChild,
-               "names node " + std::to_string(at.child) + ", depth-first order asks for " +
-                   std::to_string(subtree.node_end));
-        subtree.node_end = std::max(subtree.node_end, subtrees_[at.child].node_end);
-      }
-      gather_slot(at, subtree);
-    }
-  }
-
-  void gather_root() {
+  // The root, and what the header declares about the whole tree.
+  void check_root() {
+    const Slot root{header_.root, header_.root_line_space, 0, -1, {header_.bounds_min, header_.bounds_max}};
     Subtree whole;
-    gather_slot(root(), whole);
+    check_slot(root, whole);
+    const uint32_t deepest = nodes_.empty() ? 0 : subtrees_[0].height;
+    if (deepest > header_.max_depth)
+      report_.add(
+          RuleId::kDepthExceeded, offsetof(LspHeader, max_depth), 4, "/header/max_depth",
+          "is " + std::to_string(header_.max_depth) + ", but a leaf is " + std::to_string(deepest) + " deep");
+    if (deepest > header_.max_stack)
+      report_.add(RuleId::kStackExceeded, offsetof(LspHeader, max_stack), 4, "/header/max_stack",
+                  "is " + std::to_string(header_.max_stack) + ", but a traversal may need " +
+                      std::to_string(deepest));
+    if (nodes_.size() + ends_ > header_.max_steps)
+      report_.add(RuleId::kStepsExceeded, offsetof(LspHeader, max_steps), 4, "/header/max_steps",
+                  "is " + std::to_string(header_.max_steps) + ", but there are " +
+                      std::to_string(nodes_.size()) + " nodes and " + std::to_string(ends_) +
+                      " leaves or Line Spaces in place of them");
     const uint64_t covered = whole.triangles.first == 0 ? whole.triangles.end : 0;
     if (covered != header_.triangle_count && view_.part(Kind::kTria).usable)
       report_.add(RuleId::kTrianglesUnused, view_.offset_of(Kind::kTria, covered * sizeof(LspTriangle)),
@@ -319,6 +295,9 @@ class TreeCheck {
   }
 
   void check_unused() {
+    for (uint64_t i = 1; i < has_parent_.size(); ++i)
+      if (!has_parent_[i]) [[unlikely]]
+        find_unreachable(i);
     for (uint64_t i = 0; i < line_space_seen_.size(); ++i)
       if (!line_space_seen_[i])
         report_.add(RuleId::kLineSpaceUnused, view_.offset_of(Kind::kLspc, i * sizeof(LspLineSpace)),
@@ -327,18 +306,25 @@ class TreeCheck {
                     });
   }
 
+  // Its boxes were compared with no parent's: they are looked at here.
+  [[gnu::cold]] void find_unreachable(uint64_t i) {
+    find_node(RuleId::kUnreachable, i, "no node before it refers to it");
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    const Box everything{{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
+    for (int side : {0, 1})
+      if (const Slot inner = slot(i, side); !inner.empty()) explain_box(inner, everything);
+  }
+
   const FileView& view_;
   Report& report_;
   const LspHeader& header_;
   std::span<const LspNode> nodes_;
   std::span<const LspLineSpace> line_spaces_;
   bool exact_;
-  std::vector<uint32_t> parent_slot_;  // parent * 2 + side
-  std::vector<uint32_t> depth_;
+  std::vector<bool> has_parent_;
   std::vector<bool> line_space_seen_;
-  std::vector<Subtree> subtrees_;
-  uint32_t deepest_ = 0;
-  uint64_t ends_ = 0;  // leaves, and Line Spaces that stand for a subtree left out
+  std::unique_ptr<Subtree[]> subtrees_;  // of the nodes that were passed
+  uint64_t ends_ = 0;                    // leaves, and Line Spaces that stand for a subtree left out
 };
 
 }  // namespace

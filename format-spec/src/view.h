@@ -59,6 +59,7 @@ struct FileView {
   template <class T>
   std::span<const T> elements(Kind kind) const {
     const Part& section = part(kind);
+    if (!section.usable) return {};  // damaged sections may even be misaligned
     return {reinterpret_cast<const T*>(section.data.data()), section.data.size() / sizeof(T)};
   }
 

@@ -126,6 +126,18 @@ TEST(Damage, EveryPairOfSectionsOverlapping) {
     }
 }
 
+// A section that is misaligned and counted wrong at once must not be read in place.
+TEST(Damage, MisalignedSections) {
+  for (size_t section = 0; section < 8; ++section)
+    for (bool counted : {true, false}) {
+      Bytes bytes = encode(full_scene());
+      table_of(bytes)[section].offset -= 1;
+      if (!counted) header_of(bytes).line_space_count = header_of(bytes).node_count = 0;
+      repair_hashes(bytes);
+      EXPECT_TRUE(check_exact(bytes).has(RuleId::kSectionMisaligned)) << section;
+    }
+}
+
 TEST(Damage, OffsetsNearTheEndOfTheNumbers) {
   for (uint64_t offset : {~uint64_t{0}, ~uint64_t{255}, uint64_t{1} << 63, (uint64_t{1} << 63) - 256}) {
     Bytes bytes = encode(full_scene());
