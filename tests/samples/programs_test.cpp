@@ -119,6 +119,18 @@ TEST_F(Programs, HelloTracesARay) {
   EXPECT_EQ(read(file("hello.txt")).rfind("hit triangle", 0), 0u) << read(file("hello.txt"));
 }
 
+TEST_F(Programs, HelloVulkanTracesTheSameRay) {
+  std::string why;
+  if (!VulkanTracer::available(&why)) GTEST_SKIP() << "no Vulkan device: " << why;
+  ASSERT_EQ(run("hello " + file("plane.lsp") + " > " + file("hello.txt")), 0);
+  ASSERT_EQ(run("hello_vulkan " + file("plane.lsp") + " > " + file("hello_vulkan.txt")), 0);
+  // Triangle and distance; the rest of the lines differs.
+  const std::string cpu = read(file("hello.txt"));
+  const std::string vulkan = read(file("hello_vulkan.txt"));
+  const std::string hit = cpu.substr(0, cpu.find(','));
+  EXPECT_NE(vulkan.find(hit), std::string::npos) << cpu << vulkan;
+}
+
 TEST_F(Programs, ExitCodes) {
   const std::string quiet = " >/dev/null 2>&1";
   const std::string scene = file("spheres.lsp");
