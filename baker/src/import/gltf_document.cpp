@@ -67,7 +67,7 @@ Container open_container(const std::string& file, std::string_view bytes) {
 
 json parse_json(const std::string& file, std::string_view text, Budget& budget) {
   int depth = 0;
-  uint64_t values = 0;
+  uint64_t objects = 0, values = 0;
   bool in_string = false;
   for (size_t i = 0; i < text.size(); ++i) {
     const char c = text[i];
@@ -77,7 +77,7 @@ json parse_json(const std::string& file, std::string_view text, Budget& budget) 
     } else if (c == '"') {
       in_string = true;
     } else if (c == '[' || c == '{') {
-      ++values;
+      ++(c == '{' ? objects : values);
       if (++depth > kMaxDepth) fail(file, "nests its JSON deeper than glTF does");
     } else if (c == ']' || c == '}') {
       --depth;
@@ -85,8 +85,10 @@ json parse_json(const std::string& file, std::string_view text, Budget& budget) 
       ++values;
     }
   }
-  // Two documents and tinygltf's objects, by the largest of them (an empty node is three characters).
-  budget.charge(file, values, 1024);
+  // What two documents and tinygltf's structures (half a KB for the two braces of an empty node) take at
+  // most.
+  budget.charge(file, objects, 1024);
+  budget.charge(file, values, 96);
   budget.charge(file, text.size(), 2);
   json document = json::parse(text, nullptr, false);
   if (document.is_discarded()) fail(file, "is not valid JSON");
@@ -364,6 +366,7 @@ std::unique_ptr<GltfDocument> read_gltf_document(const std::filesystem::path& pa
     check_version(out->file, document);
     check_extensions(out->file, document);
     read_buffers(path, document, container.binary, *out, budget);
+    budget.charge(out->file, member(document, "materials").size(), 2 * sizeof(tinygltf::Material));
     json geometry = reduce_document(document);
     make_integers(out->file, "", geometry);
     reduced = geometry.dump(-1, ' ', false, json::error_handler_t::replace);

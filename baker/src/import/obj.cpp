@@ -1,5 +1,7 @@
 // Wavefront OBJ: polygons, normals, materials. Lines, points, curves and surfaces hold no triangles.
+#include <algorithm>
 #include <map>
+#include <set>
 #include <unordered_map>
 
 #include "import/mtl.h"
@@ -120,26 +122,29 @@ class ObjReader {
     material_ = at->second;
   }
 
-  // A mtllib line names one file, which may hold spaces, or several.
-  void read_library(const std::string& words, std::map<std::string, Material>& materials) {
-    const auto try_file = [&](std::string name) {
-      for (char& c : name) {
-        if (c == '\\') c = '/';
-      }
+  // Reads the library `name`, if there is a file by that name.
+  bool try_library(std::string name, std::map<std::string, Material>& materials) {
+    // A hostile line may name the same large file thousands of times.
+    constexpr size_t kMaxTries = 1000;
+    if (++libraries_tried_ > kMaxTries) return true;
+    std::replace(name.begin(), name.end(), '\\', '/');
+    // Exporters write the path on their own machine; the file itself is usually beside the mesh.
+    for (const auto& path :
+         {path_.parent_path() / name, path_.parent_path() / std::filesystem::path(name).filename()}) {
       std::error_code error;
-      const std::filesystem::path beside = path_.parent_path() / name;
-      // Exporters write the path of their own machine; the file itself is usually beside the mesh.
-      for (const auto& path : {beside, path_.parent_path() / std::filesystem::path(name).filename()}) {
-        if (!std::filesystem::is_regular_file(path, error)) continue;
-        read_mtl(path, builder_.budget(), materials);
-        return true;
-      }
-      return false;
-    };
-    if (words.empty() || words.find('\0') != words.npos || try_file(words)) return;
+      if (!std::filesystem::is_regular_file(path, error)) continue;
+      read_mtl(path, builder_.budget(), materials);
+      return true;
+    }
+    return false;
+  }
+
+  // A mtllib line names one file, which may hold spaces, or several.
+  void read_libraries(const std::string& words, std::map<std::string, Material>& materials) {
+    if (words.empty() || words.find('\0') != words.npos || try_library(words, materials)) return;
     std::string_view rest = words, word;
     while (take_word(rest, word)) {
-      if (!try_file(std::string(word))) {
+      if (!try_library(std::string(word), materials)) {
         builder_.note(file_ + ": the material library " + std::string(word) + " is not there");
       }
     }
@@ -148,11 +153,9 @@ class ObjReader {
   // Replaces the numbers of names that faces carry by the builder's materials.
   void resolve_materials() {
     std::map<std::string, Material> defined;
-    constexpr size_t kMaxLibraries = 1000;
-    std::map<std::string, bool> read;
+    std::set<std::string> seen;
     for (const std::string& library : libraries_) {
-      if (read.size() < kMaxLibraries && read.try_emplace(library, true).second)
-        read_library(library, defined);
+      if (seen.insert(library).second) read_libraries(library, defined);
     }
     std::vector<uint32_t> ids(used_.size(), kNoIndex);
     uint64_t missing = 0;
@@ -184,6 +187,7 @@ class ObjReader {
   std::vector<std::string> used_{std::string(kDefaultMaterial)};  // names, by the number in soup_.materials
   uint32_t material_ = 0;
   std::vector<std::string> libraries_;
+  size_t libraries_tried_ = 0;
   uint64_t other_elements_ = 0;
   bool colored_ = false;
 };
