@@ -80,17 +80,17 @@ class ApproximateOnly {
  public:
   explicit ApproximateOnly(Baked& baked) : baked_(baked) {
     referred_.assign(baked.triangles.size(), false);
+    place_.assign(baked.triangles.size(), LSP_NONE);
     for (size_t i = 0; i < baked.line_spaces.records.size(); ++i) mark(i);
   }
 
   void run() {
-    if (baked_.header.root_line_space == LSP_NONE || !(baked_.header.root_line_space & LSP_TERMINAL_BIT)) {
-      baked_.header.root = copy(baked_.header.root);
-    } else {
-      keep_site(baked_.header.root_line_space & LSP_LINE_SPACE_MASK);
-      baked_.header.root = LSP_NONE;
-    }
-    // Outer Line Spaces (of several depths) span the kept triangles of their subtree.
+    baked_.header.root = copy(baked_.header.root, baked_.header.root_line_space, 0);
+    LspHeader& h = baked_.header;
+    h.max_steps = uint32_t(nodes_.size()) + ends_ + 1;
+    h.max_depth = depth_;
+    h.max_stack = std::max(1u, depth_);
+    h.max_leaf_triangles = max_leaf_;
     baked_.nodes = std::move(nodes_);
     baked_.triangles = std::move(triangles_);
     baked_.normals = std::move(normals_);
@@ -130,55 +130,76 @@ class ApproximateOnly {
   uint32_t keep(uint32_t first, uint32_t count) {
     const uint32_t start = uint32_t(triangles_.size());
     for (uint32_t i = first; i < first + count; ++i) {
+      place_[i] = uint32_t(triangles_.size());
       triangles_.push_back(baked_.triangles[i]);
       if (!baked_.normals.empty()) normals_.push_back(baked_.normals[i]);
     }
     return start;
   }
 
+  // Keeps the referred triangles of a terminal site; the subtree itself goes.
   void keep_site(uint32_t index) {
-    LspLineSpace& r = baked_.line_spaces.records[index];
-    std::vector<uint32_t> place(r.triangle_count, 0);
+    const LspLineSpace& r = baked_.line_spaces.records[index];
     const uint32_t start = uint32_t(triangles_.size());
-    for (uint32_t i = 0; i < r.triangle_count; ++i) {
-      if (!referred_[r.triangle_first + i]) continue;
-      place[i] = uint32_t(triangles_.size()) - start;
-      keep(r.triangle_first + i, 1);
-    }
-    for_each_entry(r, [&](uint32_t local) { return place[local]; });
-    r.triangle_first = start;
-    r.triangle_count = uint32_t(triangles_.size()) - start;
-    r.child = LSP_NONE;
+    for (uint32_t i = r.triangle_first; i < r.triangle_first + r.triangle_count; ++i)
+      if (referred_[i]) keep(i, 1);
+    renumber(index, start, LSP_NONE);
   }
 
-  uint32_t copy(uint32_t child) {
+  // A Line Space whose node now is `child` and whose triangles lie from `start` to the last one kept.
+  void renumber(uint32_t index, uint32_t start, uint32_t child) {
+    LspLineSpace& r = baked_.line_spaces.records[index];
+    for_each_entry(r, [&](uint32_t local) { return place_[r.triangle_first + local] - start; });
+    r.triangle_first = start;
+    r.triangle_count = uint32_t(triangles_.size()) - start;
+    r.child = child;
+  }
+
+  uint32_t copy(uint32_t child, uint32_t line_space, uint32_t depth) {
     if (child == LSP_NONE) return child;
+    depth_ = std::max(depth_, depth);
+    if (line_space != LSP_NONE && (line_space & LSP_TERMINAL_BIT)) {
+      keep_site(line_space & LSP_LINE_SPACE_MASK);
+      ++ends_;
+      return LSP_NONE;
+    }
     if (child & LSP_LEAF_BIT) {
       const uint32_t count = (child >> LSP_LEAF_COUNT_SHIFT & LSP_LEAF_COUNT_MASK) + 1;
+      ++ends_;
+      max_leaf_ = std::max(max_leaf_, count);
       return (child & ~LSP_LEAF_FIRST_MASK) | keep(child & LSP_LEAF_FIRST_MASK, count);
     }
-    const uint32_t index = uint32_t(nodes_.size());
-    nodes_.push_back(baked_.nodes[child]);
-    const auto side = [&](uint32_t c, uint32_t line_space) {
-      if (line_space != LSP_NONE && (line_space & LSP_TERMINAL_BIT)) {
-        keep_site(line_space & LSP_LINE_SPACE_MASK);
-        return LSP_NONE;
-      }
-      return copy(c);
-    };
-    const uint32_t c0 = side(nodes_[index].child0, nodes_[index].line_space0);
-    nodes_[index].child0 = c0;
-    const uint32_t c1 = side(nodes_[index].child1, nodes_[index].line_space1);
-    nodes_[index].child1 = c1;
+    const uint32_t index = uint32_t(nodes_.size()), start = uint32_t(triangles_.size());
+    const LspNode old = baked_.nodes[child];
+    nodes_.push_back(old);
+    const uint32_t child0 = copy(old.child0, old.line_space0, depth + 1);
+    nodes_[index].child0 = child0;
+    const uint32_t child1 = copy(old.child1, old.line_space1, depth + 1);
+    nodes_[index].child1 = child1;
+    if (line_space != LSP_NONE) renumber(line_space, start, index);
     return index;
   }
 
   Baked& baked_;
   std::vector<bool> referred_;
+  std::vector<uint32_t> place_;  // of a kept triangle among the kept ones
+  uint32_t ends_ = 0;            // leaves and terminal Line Spaces
+  uint32_t depth_ = 0;
+  uint32_t max_leaf_ = 0;
   std::vector<LspNode> nodes_;
   std::vector<LspTriangle> triangles_;
   std::vector<LspCornerNormals> normals_;
 };
+
+void set_counts(Baked& baked) {
+  LspHeader& h = baked.header;
+  h.node_count = uint32_t(baked.nodes.size());
+  h.triangle_count = uint32_t(baked.triangles.size());
+  h.line_space_count = uint32_t(baked.line_spaces.records.size());
+  h.bit_word_count = uint32_t(baked.line_spaces.words.size());
+  h.candidate_word_count = uint32_t(baked.line_spaces.candidates.size());
+  h.material_count = uint32_t(baked.materials.size());
+}
 
 }  // namespace
 
@@ -255,28 +276,23 @@ Baked bake(const Mesh& mesh, const BakeOptions& options, const Progress& progres
   }
   baked.nodes = std::move(bvh.nodes);
 
-  if (!options.exact) {
-    const size_t nodes = baked.nodes.size(), triangles = baked.triangles.size();
-    ApproximateOnly(baked).run();
-    baked.skipped.push_back("nodes below Line Spaces: " + with_commas(nodes - baked.nodes.size()));
-    baked.skipped.push_back("triangles no shaft refers to: " +
-                            with_commas(triangles - baked.triangles.size()));
-  }
-
   h.required_features =
-      (options.exact ? LSP_FEATURE_EXACT : 0) |
-      (baked.line_spaces.records.empty() ? 0 : LSP_FEATURE_LINE_SPACES) |
+      LSP_FEATURE_EXACT | (baked.line_spaces.records.empty() ? 0 : LSP_FEATURE_LINE_SPACES) |
       (normals ? LSP_FEATURE_NORMALS : 0) | (shading ? LSP_FEATURE_MATERIALS : 0) |
       (!baked.line_spaces.records.empty() && options.line_space.kind == LineSpaceKind::kBinary
            ? LSP_FEATURE_BINARY
            : 0);
-  h.node_count = uint32_t(baked.nodes.size());
-  h.triangle_count = uint32_t(baked.triangles.size());
-  h.line_space_count = uint32_t(baked.line_spaces.records.size());
-  h.bit_word_count = uint32_t(baked.line_spaces.words.size());
-  h.candidate_word_count = uint32_t(baked.line_spaces.candidates.size());
-  h.material_count = uint32_t(baked.materials.size());
+  set_counts(baked);
   return baked;
+}
+
+void keep_approximate_only(Baked& baked) {
+  const size_t nodes = baked.nodes.size(), triangles = baked.triangles.size();
+  ApproximateOnly(baked).run();
+  baked.header.required_features &= ~LSP_FEATURE_EXACT;
+  baked.skipped.push_back("nodes below Line Spaces: " + with_commas(nodes - baked.nodes.size()));
+  baked.skipped.push_back("triangles no shaft refers to: " + with_commas(triangles - baked.triangles.size()));
+  set_counts(baked);
 }
 
 }  // namespace lsp

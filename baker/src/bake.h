@@ -25,7 +25,6 @@ enum class Purpose {
 
 struct BakeOptions {
   Purpose purpose = Purpose::kAll;
-  bool exact = true;  // keep the tree below the Line Spaces and every triangle
   bool line_spaces = true;
   BvhOptions bvh;
   LineSpaceOptions line_space;
@@ -50,7 +49,11 @@ struct Baked {
 // Called with the stage's name and the share of it done, from any thread.
 using Progress = std::function<void(std::string_view stage, double done)>;
 
-// Throws Failure with Exit::kLimit when the memory limit would be exceeded.
+// The result is exact and approximate. Throws Failure with Exit::kLimit when the memory limit would be exceeded.
 Baked bake(const Mesh& mesh, const BakeOptions& options, const Progress& progress = {});
+
+// Leaves out of `baked` what only exact traces need: nodes below terminal Line Spaces and the triangles there
+// that no shaft refers to.
+void keep_approximate_only(Baked& baked);
 
 }  // namespace lsp

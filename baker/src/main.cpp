@@ -12,6 +12,7 @@
 #include <sstream>
 
 #include "bake.h"
+#include "error.h"
 #include "import/import.h"
 #include "lsp/command_line.h"
 #include "writer.h"
@@ -41,8 +42,21 @@ struct Arguments {
   uint32_t samples = 5;
   float crease_angle = 40;
   bool no_splits = false;
+  std::string preset = "balanced";
+  double max_error = 0;  // per cent of rays, 0: not asked for
+  bool resolution_given = false, depth_given = false, samples_given = false;
   CommonOptions common;
 };
+
+// What decides between speed and accuracy, in one step each.
+struct Quality {
+  uint32_t resolution, depth, samples;
+};
+const std::map<std::string, Quality> kPresets = {
+    {"fast", {4, 8, 3}}, {"balanced", {6, 9, 5}}, {"accurate", {6, 11, 9}}};
+// From cheap to dear, for --max-error.
+const std::vector<Quality> kLadder = {{4, 7, 5}, {4, 9, 5}, {6, 9, 5}, {6, 11, 9}, {8, 11, 9}, {8, 13, 9}};
+constexpr uint64_t kErrorRays = 65536;
 
 std::string hex128(uint64_t lo, uint64_t hi) {
   char text[33];
@@ -56,8 +70,19 @@ std::string megabytes(uint64_t bytes) {
   return text;
 }
 
+// Null where nothing could be measured.
+Json to_json(const MeasuredError& e) {
+  if (e.rays == 0) return nullptr;
+  return {{"rays", e.rays},
+          {"wrong_hits", e.wrong_hits},
+          {"wrong_misses", e.wrong_misses},
+          {"wrong_percent", 100 * e.wrong_share()},
+          {"depth_error_percent_of_diagonal", 100 * e.depth_error}};
+}
+
 // Provenance: nothing in it depends on the machine, the time, the threads or the folder.
-Json provenance(const Arguments& a, const Mesh& mesh, const std::array<uint64_t, 2>& source) {
+Json provenance(const Arguments& a, const Mesh& mesh, const std::array<uint64_t, 2>& source,
+                const MeasuredError& error) {
   Json inputs = Json::array();
   for (const auto& p : a.inputs) inputs.push_back(p.filename().string());
   Json materials = Json::array();
@@ -89,14 +114,24 @@ Json provenance(const Arguments& a, const Mesh& mesh, const std::array<uint64_t,
             {"degenerate", mesh.rejected.degenerate},
             {"non_finite", mesh.rejected.non_finite},
             {"out_of_range", mesh.rejected.out_of_range}}},
+          {"error", to_json(error)},
           {"materials", materials}};
 }
 
-Exit run(const Arguments& a) {
+Exit run(Arguments a) {
   if (a.exact && a.no_exact) throw Failure(Exit::kUsage, "", "--exact and --no-exact exclude each other");
   if (a.base == "ntree")
     throw Failure(Exit::kUnsupported, "",
                   "the base structure ntree is not built by this version, use --base bvh");
+  if (a.max_error > 0 && (a.resolution_given || a.depth_given || a.samples_given))
+    throw Failure(Exit::kUsage, "",
+                  "--max-error chooses --resolution, --depth and --samples itself, leave them out");
+  if (a.max_error > 0 && (a.no_line_spaces || a.purpose == Purpose::kVisibility))
+    throw Failure(Exit::kUsage, "", "--max-error needs Line Spaces with candidates");
+  const Quality& preset = kPresets.at(a.preset);
+  if (!a.resolution_given) a.resolution = preset.resolution;
+  if (!a.depth_given) a.depths = {preset.depth};
+  if (!a.samples_given) a.samples = preset.samples;
   if (a.no_line_spaces && a.no_exact)
     throw Failure(Exit::kUsage, "", "--no-line-spaces with --no-exact leaves nothing to trace");
   std::unique_ptr<tbb::global_control> control;
@@ -121,25 +156,52 @@ Exit run(const Arguments& a) {
 
   BakeOptions options;
   options.purpose = a.purpose;
-  options.exact = !a.no_exact;
   options.line_spaces = !a.no_line_spaces;
   options.bvh.spatial_splits = !a.no_splits;
-  options.line_space.resolution = a.resolution;
-  options.line_space.depths = a.depths;
   options.line_space.triangles = a.triangles;
-  options.line_space.samples = a.samples;
   options.line_space.kind =
       a.purpose == Purpose::kVisibility ? LineSpaceKind::kBinary : LineSpaceKind::kCandidates;
   options.normal_angle_degrees = a.normal_angle;
   options.plane_tolerance = a.plane_tolerance;
   options.memory_limit = a.memory_limit;
-  Baked baked = bake(mesh, options, [&](std::string_view stage, double done) { bar.show(stage, done); });
+  const auto bake_with = [&](const Arguments& with) {
+    options.line_space.resolution = with.resolution;
+    options.line_space.depths = with.depths;
+    options.line_space.samples = with.samples;
+    return bake(mesh, options, [&](std::string_view stage, double done) { bar.show(stage, done); });
+  };
+  const bool measure = !a.no_line_spaces && a.purpose != Purpose::kVisibility;
+  Baked baked;
+  MeasuredError error;
+  if (a.max_error > 0) {
+    for (const Quality& q : kLadder) {
+      a.resolution = q.resolution;
+      a.depths = {q.depth};
+      a.samples = q.samples;
+      baked = bake_with(a);
+      error = measure_error(baked, kErrorRays);
+      if (100 * error.wrong_share() <= a.max_error) break;
+    }
+    if (100 * error.wrong_share() > a.max_error) {
+      char text[160];
+      std::snprintf(
+          text, sizeof text,
+          "the most accurate setting still answers %.3f %% of rays wrongly, over --max-error %g: allow more, "
+          "or trace exactly",
+          100 * error.wrong_share(), a.max_error);
+      throw Failure(Exit::kLimit, a.inputs[0].string(), text);
+    }
+  } else {
+    baked = bake_with(a);
+    if (measure) error = measure_error(baked, kErrorRays);
+  }
+  if (a.no_exact) keep_approximate_only(baked);
   baked.header.source_hash_lo = source[0];
   baked.header.source_hash_hi = source[1];
   timer();
 
   bar.show("write", 0);
-  const Json meta = provenance(a, mesh, source);
+  const Json meta = provenance(a, mesh, source, error);
   const Written written = write_lsp(a.output, baked, meta.dump(), {a.align, a.compress == "zstd", 12});
   const double write_seconds = timer();
   bar.clear();
@@ -156,6 +218,7 @@ Exit run(const Arguments& a) {
                    {"triangles", meta["triangles"]},
                    {"notes", mesh.notes},
                    {"skipped", baked.skipped},
+                   {"error", meta["error"]},
                    {"nodes", baked.header.node_count},
                    {"triangle_records", baked.header.triangle_count},
                    {"depth", baked.header.max_depth},
@@ -185,6 +248,11 @@ Exit run(const Arguments& a) {
     if (baked.header.line_space_count)
       std::printf("Line Spaces %u, %.1f %% of the shafts filled\n", baked.header.line_space_count,
                   100.0 * double(ls.filled) / double(std::max<uint64_t>(1, ls.shafts)));
+    if (error.rays)
+      std::printf(
+          "error       %.2f %% wrong hits, %.2f %% wrong misses, depth off by %.2f %% of the diagonal\n",
+          100.0 * double(error.wrong_hits) / double(error.rays),
+          100.0 * double(error.wrong_misses) / double(error.rays), 100 * error.depth_error);
     for (const std::string& s : baked.skipped) std::printf("skipped     %s\n", s.c_str());
     std::printf("time        import %.2f s, tree %.2f s, Line Spaces %.2f s, write %.2f s; peak memory %s\n",
                 import_seconds, baked.tree_seconds, baked.line_space_seconds, write_seconds,
@@ -209,16 +277,25 @@ int main(int argc, char** argv) {
   app.add_option("INPUT", a.inputs, "Mesh files, read in this order")->required();
   app.add_option("-o,--output", a.output, "The .lsp file to write")->required();
   app.add_option("--base", a.base, "Base structure")->check(CLI::IsMember({"bvh", "ntree"}));
-  app.add_option("--resolution", a.resolution, "N: patches along an edge of a Line Space's box")
-      ->check(CLI::Range(1u, LSP_MAX_RESOLUTION));
-  app.add_option("--depth", a.depths,
-                 "D: depth of the nodes with a Line Space; several, as 6,9,12, give levels of detail")
-      ->delimiter(',')
-      ->check(CLI::Range(0u, 40u));
+  app.add_option("--preset", a.preset,
+                 "Speed against accuracy, where --resolution, --depth or --samples do not say")
+      ->check(CLI::IsMember({"fast", "balanced", "accurate"}));
+  app.add_option("--max-error", a.max_error,
+                 "Choose the cheapest setting with at most this many per cent of rays answered wrongly")
+      ->check(CLI::Range(0.0, 100.0));
+  auto* resolution =
+      app.add_option("--resolution", a.resolution, "N: patches along an edge of a Line Space's box")
+          ->check(CLI::Range(1u, LSP_MAX_RESOLUTION));
+  auto* depth =
+      app.add_option("--depth", a.depths,
+                     "D: depth of the nodes with a Line Space; several, as 6,9,12, give levels of detail")
+          ->delimiter(',')
+          ->check(CLI::Range(0u, 40u));
   app.add_option("--triangles", a.triangles, "T: nodes above D with fewer triangles get a Line Space too");
-  app.add_option("--samples", a.samples,
-                 "Rays that choose a shaft's candidate; 1: the centroid ray alone, as the paper does")
-      ->check(CLI::Range(1u, 64u));
+  auto* samples =
+      app.add_option("--samples", a.samples,
+                     "Rays that choose a shaft's candidate; 1: the centroid ray alone, as the paper does")
+          ->check(CLI::Range(1u, 64u));
   app.add_option("--for", a.purpose, "What the file is for")
       ->transform(CLI::CheckedTransformer(std::map<std::string, Purpose>{{"visibility", Purpose::kVisibility},
                                                                          {"ao", Purpose::kAo},
@@ -247,5 +324,10 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0.0f, 180.0f));
   app.add_flag("--no-splits", a.no_splits, "Build the tree without spatial splits");
   add_common_options(app, "lsp-bake", a.common);
-  return run_program("lsp-bake", app, argc, argv, [&] { return run(a); });
+  return run_program("lsp-bake", app, argc, argv, [&] {
+    a.resolution_given = resolution->count() > 0;
+    a.depth_given = depth->count() > 0;
+    a.samples_given = samples->count() > 0;
+    return run(a);
+  });
 }
