@@ -77,6 +77,7 @@ TraceRequest make_request(const Options& options, const LspHeader& header) {
   if (options.query == "any") request.options.flags |= LSP_TRACE_ANY_HIT;
   if (options.near == "approximate") request.options.flags |= LSP_TRACE_NEAR_APPROXIMATE;
   if (options.near == "skip") request.options.flags |= LSP_TRACE_NEAR_SKIP;
+  if (options.near == "skip") request.options.flags |= LSP_TRACE_NEAR_SKIP;
   request.options.lod = options.lod;
   request.vulkan = options.backend == "vulkan";
   request.repeats = options.repeats;

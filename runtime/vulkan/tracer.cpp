@@ -387,8 +387,12 @@ void VulkanTracer::Impl::retrace(const lsp_trace_options& options, std::span<con
   }
 }
 
-VulkanTrace VulkanTracer::Impl::trace(const lsp_trace_options& options, std::span<const LspRay> rays,
+VulkanTrace VulkanTracer::Impl::trace(const lsp_trace_options& wanted, std::span<const LspRay> rays,
                                       std::span<LspHit> hits, bool count) {
+  // Flags that have no meaning together make no pipeline of their own.
+  lsp_trace_options options = wanted;
+  options.flags &= (wanted.flags & LSP_TRACE_APPROXIMATE) != 0 ? LSP_TRACE_ALL_FLAGS : LSP_TRACE_ANY_HIT;
+  if ((options.flags & LSP_TRACE_NEAR_APPROXIMATE) != 0) options.flags &= ~LSP_TRACE_NEAR_SKIP;
   const uint32_t needed = (options.flags & LSP_TRACE_APPROXIMATE) != 0 ? LSP_USE_APPROXIMATE : LSP_USE_EXACT;
   if (scene_buffers == nullptr || (uses_ & needed) == 0) {
     throw Failure(Exit::kUnsupported, "", "the scene is not loaded for this kind of trace");

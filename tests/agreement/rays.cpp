@@ -11,7 +11,7 @@ constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 class Rays {
  public:
-  Rays(const Parts& parts, uint64_t seed) : parts_(parts), random_(seed) {}
+  Rays(const Parts& parts, uint64_t seed, float scale) : parts_(parts), random_(seed), scale_(scale) {}
 
   LspRay make(uint32_t kind) {
     LspRay ray{point(2), 0, direction(), kInfinity};
@@ -74,7 +74,7 @@ class Rays {
     }
     return ray;
   }
-  static constexpr uint32_t kKinds = 13;
+  static constexpr uint32_t kKinds = 14;
 
  private:
   void invalidate(LspRay& ray, uint32_t how) {
@@ -111,10 +111,11 @@ class Rays {
 
   float zero() { return random_.below(2) == 0 ? 0.0f : -0.0f; }
   lsp_float3 point(float size) {
-    return {random_.between(-size, size), random_.between(-size, size), random_.between(-size, size)};
+    const float s = size * scale_;
+    return {random_.between(-s, s), random_.between(-s, s), random_.between(-s, s)};
   }
   lsp_float3 direction() {
-    lsp_float3 d = point(1);
+    lsp_float3 d{random_.between(-1, 1), random_.between(-1, 1), random_.between(-1, 1)};
     if (d.x == 0 && d.y == 0 && d.z == 0) d.x = 1;
     return d;
   }
@@ -135,12 +136,13 @@ class Rays {
 
   const Parts& parts_;
   Random random_;
+  float scale_;
 };
 
 }  // namespace
 
-std::vector<LspRay> hard_rays(const Parts& parts, uint32_t count, uint64_t seed) {
-  Rays rays(parts, seed);
+std::vector<LspRay> hard_rays(const Parts& parts, uint32_t count, uint64_t seed, float scale) {
+  Rays rays(parts, seed, scale);
   std::vector<LspRay> result;
   result.reserve(count);
   for (uint32_t i = 0; i < count; ++i) result.push_back(rays.make(i % Rays::kKinds));

@@ -8,7 +8,7 @@
 
 namespace lsp::test {
 
-// `count` rays about the scene, every kind in turn.
-std::vector<LspRay> hard_rays(const Parts& parts, uint32_t count, uint64_t seed);
+// `count` rays about a scene of the given scale, every kind in turn.
+std::vector<LspRay> hard_rays(const Parts& parts, uint32_t count, uint64_t seed, float scale = 1);
 
 }  // namespace lsp::test

@@ -35,6 +35,8 @@ constexpr Trace kTraces[] = {
     {"approximate_any", {LSP_TRACE_APPROXIMATE | LSP_TRACE_ANY_HIT, 0}},
     {"approximate_near", {LSP_TRACE_APPROXIMATE | LSP_TRACE_NEAR_APPROXIMATE, 0}},
     {"approximate_near_any", {LSP_TRACE_APPROXIMATE | LSP_TRACE_NEAR_APPROXIMATE | LSP_TRACE_ANY_HIT, 0}},
+    {"approximate_skip", {LSP_TRACE_APPROXIMATE | LSP_TRACE_NEAR_SKIP, 0}},
+    {"approximate_skip_any", {LSP_TRACE_APPROXIMATE | LSP_TRACE_NEAR_SKIP | LSP_TRACE_ANY_HIT, 0.5f}},
     {"approximate_lod", {LSP_TRACE_APPROXIMATE, 0.7f}},
     {"approximate_lod_near", {LSP_TRACE_APPROXIMATE | LSP_TRACE_NEAR_APPROXIMATE, 3.0f}},
 };
@@ -131,6 +133,18 @@ TEST_P(Agreement, HardRays) {
     if (triangles > 100) {
       EXPECT_GT(hits, 5000u);
     }
+  }
+}
+
+// Scenes of any unit: where products of coordinates leave the range of normal numbers, too.
+TEST_P(Agreement, ScenesOfEveryScale) {
+  for (const float scale : {1e-30f, 1e-18f, 1e-9f, 1e6f, 1e12f, 1e18f}) {
+    SCOPED_TRACE(scale);
+    BuildOptions options;
+    options.scale = scale;
+    const Parts parts = build_parts(options);
+    compare(parts, hard_rays(parts, 4000, 77, scale));
+    if (!skipped_.empty()) GTEST_SKIP() << skipped_;
   }
 }
 

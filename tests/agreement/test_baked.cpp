@@ -105,10 +105,10 @@ class Baked : public testing::TestWithParam<const char*> {
   void bake_and_compare(const Mesh& mesh, Purpose purpose, bool exact, uint32_t depth) {
     BakeOptions options;
     options.purpose = purpose;
-    options.exact = exact;
     options.line_space.resolution = 4;
     options.line_space.depths = {depth / 2, depth};
     lsp::Baked baked = bake(mesh, options);
+    if (!exact) keep_approximate_only(baked);
     write_lsp(path_, baked, "{}", {});
     const SceneFile file(path_);
     const std::vector<LspRay> rays = surface_rays(file.scene(), 20000);
@@ -117,8 +117,9 @@ class Baked : public testing::TestWithParam<const char*> {
     VulkanTracer tracer;
     tracer.load(file.scene(), LSP_USE_APPROXIMATE | (exact ? LSP_USE_EXACT : 0));
     constexpr uint32_t kApproximate = LSP_TRACE_APPROXIMATE;
-    for (const uint32_t flags : {0u, LSP_TRACE_ANY_HIT, kApproximate, kApproximate | LSP_TRACE_ANY_HIT,
-                                 kApproximate | LSP_TRACE_NEAR_APPROXIMATE}) {
+    for (const uint32_t flags :
+         {0u, LSP_TRACE_ANY_HIT, kApproximate, kApproximate | LSP_TRACE_ANY_HIT,
+          kApproximate | LSP_TRACE_NEAR_APPROXIMATE, kApproximate | LSP_TRACE_NEAR_SKIP}) {
       if (!exact && (flags & kApproximate) == 0) continue;
       for (const float lod : {0.0f, 0.5f}) {
         SCOPED_TRACE("flags " + std::to_string(flags) + " lod " + std::to_string(lod));

@@ -305,6 +305,7 @@ Parts build_parts(const BuildOptions& options) {
       if (i % 4 == 2) p.y = std::round(c[1] * 4) / 4;
       if (i % 4 == 3) p.z = std::round(c[2] * 4) / 4;
     }
+    for (lsp_float3& p : v) p = {p.x * options.scale, p.y * options.scale, p.z * options.scale};
     parts.triangles.push_back({v[0], i, v[1], 0, v[2], 0});
   }
   build_tree(parts, options, random);

@@ -50,6 +50,7 @@ struct BuildOptions {
   uint32_t line_space_depth = 4;  // terminal Line Spaces are here; others at half this depth
   uint32_t leaf_triangles = 4;
   uint32_t alignment = 4096;
+  float scale = 1;  // the soup lies in a cube of twice this size
 };
 
 // A soup of triangles, some of them exactly in planes of an axis, under a median-split tree. Its Line Spaces

@@ -89,6 +89,7 @@ TEST_F(LspTrace, WritesTheLibrarysHits) {
       {"--mode exact", 0},
       {"--mode exact --query any", LSP_TRACE_ANY_HIT},
       {"--mode approximate --near approximate", LSP_TRACE_APPROXIMATE | LSP_TRACE_NEAR_APPROXIMATE},
+      {"--mode approximate --near skip", LSP_TRACE_APPROXIMATE | LSP_TRACE_NEAR_SKIP},
       {"--mode exact --threads 3", 0},
   };
   for (const auto& c : cases) {
