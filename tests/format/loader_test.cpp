@@ -3,14 +3,11 @@
 #include <gtest/gtest.h>
 #include <lsp/lsp.h>
 
-#include <cmath>
 #include <cstring>
-#include <memory>
-#include <new>
 
 #include "check.h"
 #include "mutations.h"
-#include "mutator.h"
+#include "opened.h"
 #include "scenes.h"
 
 namespace {
@@ -19,74 +16,18 @@ using namespace lsp;
 using namespace lsp::corpus;
 using namespace lsp::format;
 
-constexpr uint64_t kMemoryLimit = uint64_t{1} << 26;
-
-// Bytes at a multiple of 16 and of exactly their size, so that the sanitizers see any access beyond them.
-class AlignedBytes {
- public:
-  explicit AlignedBytes(size_t size) : data_(new (std::align_val_t{16}) std::byte[size]), size_(size) {}
-  explicit AlignedBytes(const Bytes& bytes) : AlignedBytes(bytes.size()) {
-    if (size_ != 0) std::memcpy(data_.get(), bytes.data(), size_);
-  }
-  std::byte* data() { return data_.get(); }
-  size_t size() const { return size_; }
-
- private:
-  struct Free {
-    void operator()(std::byte* bytes) const { operator delete[](bytes, std::align_val_t{16}); }
-  };
-  std::unique_ptr<std::byte[], Free> data_;
-  size_t size_;
-};
-
-// The file in memory as the tracer takes it; unpacked when it is packed.
-struct Opened {
-  lsp_status status = LSP_OK;
-  lsp_error error{};
-  std::unique_ptr<AlignedBytes> bytes;
-  lsp_scene scene{};
-};
-
-Opened open(const Bytes& file) {
-  Opened opened;
-  opened.bytes = std::make_unique<AlignedBytes>(file);
-  opened.status = lsp_open(opened.bytes->data(), file.size(), &opened.scene, &opened.error);
-  if (opened.status != LSP_ERROR_UNSUPPORTED) return opened;
-  uint64_t size = 0;
-  const lsp_status status = lsp_unpacked_size(opened.bytes->data(), file.size(), &size, &opened.error);
-  if (status != LSP_OK || size > kMemoryLimit) return opened;
-  auto raw = std::make_unique<AlignedBytes>(size);
-  opened.status = lsp_unpack(opened.bytes->data(), file.size(), raw->data(), size, &opened.error);
-  if (opened.status != LSP_OK) return opened;
-  opened.bytes = std::move(raw);
-  opened.status = lsp_open(opened.bytes->data(), opened.bytes->size(), &opened.scene, &opened.error);
-  return opened;
-}
-
-// Sixteen rays through the scene's bounds in every mode that the file allows; their answers make sense.
+// Sixteen rays in every mode that the file allows; their answers make sense.
 void trace(const lsp_scene& scene, const std::string& context) {
   const LspHeader& header = *scene.header;
-  LspRay rays[16];
+  const std::array<LspRay, 16> rays = rays_through(header);
   LspHit hits[16];
-  Random random(42);
-  const lsp_float3 &lo = header.bounds_min, &hi = header.bounds_max;
-  for (LspRay& ray : rays) {
-    ray.origin = {lo.x + (hi.x - lo.x) * random.unit(), lo.y + (hi.y - lo.y) * random.unit(),
-                  lo.z + (hi.z - lo.z) * random.unit()};
-    ray.direction = {random.unit() - 0.5f, random.unit() - 0.5f, random.unit() - 0.5f};
-    ray.tmin = 0;
-    ray.tmax = INFINITY;
-  }
-  rays[0].direction = {1, 0, 0};
-  rays[1].direction = {0, -1, 0};
-  rays[2].direction = {0, 0, 0};
   const bool exact = header.required_features & LSP_FEATURE_EXACT;
   const bool approximate = header.required_features & LSP_FEATURE_LINE_SPACES;
   for (uint32_t flags = 0; flags < 8; ++flags) {
     const bool able = flags & LSP_TRACE_APPROXIMATE ? approximate : exact;
     const lsp_trace_options options{flags, flags & LSP_TRACE_NEAR_APPROXIMATE ? 0.5f : 0.0f};
     lsp_trace_counts counts{};
-    const lsp_status status = lsp_trace(&scene, &options, rays, hits, 16, &counts, nullptr);
+    const lsp_status status = lsp_trace(&scene, &options, rays.data(), hits, 16, &counts, nullptr);
     ASSERT_EQ(status, able ? LSP_OK : LSP_ERROR_UNSUPPORTED) << context;
     if (!able) continue;
     for (const LspHit& hit : hits) {
