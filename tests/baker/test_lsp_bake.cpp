@@ -1,0 +1,125 @@
+// lsp-bake as its users run it.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+namespace lsp::test {
+namespace {
+
+namespace fs = std::filesystem;
+const std::string kBake = std::string(LSP_BIN_DIR) + "/lsp-bake";
+
+class LspBake : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (fs::temp_directory_path() / "lsp-bake-XXXXXX").string();
+    ASSERT_NE(mkdtemp(name.data()), nullptr);
+    folder_ = name;
+    // A bumpy grid: enough triangles to give every option something to do.
+    std::ofstream obj(folder_ / "grid.obj");
+    constexpr int kSize = 60;
+    for (int i = 0; i <= kSize; ++i)
+      for (int j = 0; j <= kSize; ++j) obj << "v " << i << " " << (i * 7 + j * 13) % 5 << " " << j << "\n";
+    for (int i = 0; i < kSize; ++i)
+      for (int j = 0; j < kSize; ++j) {
+        const int a = i * (kSize + 1) + j + 1;
+        obj << "f " << a << " " << a + 1 << " " << a + kSize + 2 << " " << a + kSize + 1 << "\n";
+      }
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  int run(const std::string& arguments) {
+    const std::string command =
+        "cd '" + folder_.string() + "' && '" + kBake + "' " + arguments + " >out 2>err";
+    const int status = std::system(command.c_str());
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+  std::string read(const std::string& name) const {
+    std::ifstream file(folder_ / name, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+  size_t files() const {
+    return size_t(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(LspBake, GivesTheSameBytesOnAnyNumberOfThreads) {
+  ASSERT_EQ(run("grid.obj -o a.lsp --depth 5"), 0);
+  ASSERT_EQ(run("grid.obj -o b.lsp --depth 5 --threads 1"), 0);
+  ASSERT_GT(read("a.lsp").size(), 4096u);
+  EXPECT_TRUE(read("a.lsp") == read("b.lsp"));
+}
+
+TEST_F(LspBake, PrintsOneJsonObject) {
+  ASSERT_EQ(run("grid.obj -o a.lsp --depth 5 --json"), 0);
+  const auto report = nlohmann::json::parse(read("out"));
+  EXPECT_EQ(report["triangles"]["read"], 7200);
+  EXPECT_EQ(report["file_bytes"], fs::file_size(folder_ / "a.lsp"));
+  EXPECT_EQ(report["error"]["rays"], 65536);
+  EXPECT_EQ(read("err"), "");
+}
+
+TEST_F(LspBake, ExitsAsTheErrorIs) {
+  EXPECT_EQ(run("grid.obj"), 1);
+  EXPECT_NE(read("err").find("lsp-bake: "), std::string::npos);
+  EXPECT_EQ(run("grid.obj -o a.lsp --resolution 0"), 1);
+  EXPECT_EQ(run("missing.obj -o a.lsp"), 2);
+  EXPECT_NE(read("err").find("missing.obj"), std::string::npos);
+  EXPECT_EQ(run("grid.obj -o no/such/folder/a.lsp"), 2);
+  std::ofstream(folder_ / "broken.ply") << "ply\nformat ascii 1.0\nelement vertex 3\n";
+  EXPECT_EQ(run("broken.ply -o a.lsp"), 3);
+  EXPECT_EQ(run("grid.obj -o a.lsp --memory-limit 1MiB"), 6);
+  EXPECT_EQ(run("grid.obj -o a.lsp --max-error 1e-9"), 6);
+  EXPECT_FALSE(fs::exists(folder_ / "a.lsp"));
+  EXPECT_EQ(files(), 4u) << "something was left behind";
+  EXPECT_EQ(run("--version"), 0);
+  EXPECT_EQ(run("--help"), 0);
+}
+
+TEST_F(LspBake, KeepsWhatTheErrorAllows) {
+  ASSERT_EQ(run("grid.obj -o a.lsp --max-error 5 --json"), 0);
+  EXPECT_LE(nlohmann::json::parse(read("out"))["error"]["wrong_percent"], 5.0);
+}
+
+TEST_F(LspBake, LeavesTheOldFileWholeWhenKilled) {
+  ASSERT_EQ(run("grid.obj -o a.lsp --depth 4"), 0);
+  const std::string before = read("a.lsp");
+  for (const int signal : {SIGINT, SIGTERM, SIGKILL}) {
+    const pid_t child = fork();
+    if (child == 0) {
+      if (chdir(folder_.c_str()) != 0) _exit(99);
+      execl(kBake.c_str(), kBake.c_str(), "grid.obj", "-o", "a.lsp", "--resolution", "12", "--depth", "8",
+            "--quiet", nullptr);
+      _exit(99);
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(150));
+    kill(child, signal);
+    int status = 0;
+    waitpid(child, &status, 0);
+    ASSERT_TRUE(WIFSIGNALED(status)) << "the bake was over before it could be killed";
+    EXPECT_TRUE(read("a.lsp") == before);
+  }
+}
+
+TEST_F(LspBake, ReportsAFullDisk) {
+  // No file may grow beyond 64 kB: the write fails as on a full disk.
+  const std::string command = "cd '" + folder_.string() + "' && trap '' XFSZ && ulimit -f 64 && '" + kBake +
+                              "' grid.obj -o a.lsp --depth 4 --quiet 2>/dev/null";
+  const int status = std::system(command.c_str());
+  EXPECT_EQ(WEXITSTATUS(status), 2);
+  EXPECT_EQ(files(), 1u) << "something was left behind";
+}
+
+}  // namespace
+}  // namespace lsp::test
