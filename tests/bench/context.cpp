@@ -2,7 +2,38 @@
 
 #include <cstdio>
 
+#include "lsp/program.h"
+
 namespace lsp::bench {
+namespace {
+
+class VulkanFile : public Tracer {
+ public:
+  VulkanFile(VulkanTracer& vulkan, const OpenFile& file) : vulkan_(vulkan) {
+    vulkan.load(file.scene(), LSP_USE_EXACT | LSP_USE_APPROXIMATE);
+  }
+  std::string name() const override { return "Vulkan"; }
+  // In the shader, where the device has timestamps: an engine's rays and hits stay on the device.
+  double trace(const Mode& mode, std::span<const LspRay> rays, std::span<LspHit> hits) override {
+    const VulkanTrace done = vulkan_.trace(mode.options(), rays, hits);
+    return done.gpu_seconds > 0 ? done.gpu_seconds : done.seconds;
+  }
+
+ private:
+  VulkanTracer& vulkan_;
+};
+
+}  // namespace
+
+std::unique_ptr<Tracer> Context::vulkan_tracer(const OpenFile& file, const std::string& what) {
+  if (!vulkan) return nullptr;
+  try {
+    return std::make_unique<VulkanFile>(*vulkan, file);
+  } catch (const Failure& failure) {
+    warnings.push_back(what + ": no Vulkan figures: " + failure.what());
+    return nullptr;
+  }
+}
 
 double mega(size_t rays, const Timing& timing) {
   return timing.median > 0 ? static_cast<double>(rays) / timing.median * 1e-6 : 0;

@@ -26,9 +26,13 @@ struct Context {
   std::vector<std::string> warnings;
   std::vector<std::string> answers;
 
-  size_t accuracy_rays() const { return quick ? 50000 : 500000; }
-  size_t timing_rays() const { return quick ? 1u << 16 : 1u << 18; }
-  int repeats() const { return quick ? 3 : 7; }
+  size_t accuracy_rays() const { return quick ? 50000 : 200000; }
+  size_t timing_rays() const { return quick ? 1u << 16 : 1u << 17; }
+  int repeats() const { return quick ? 3 : 5; }
+
+  // The file on the Vulkan device, until the next call; null, with a warning where there is a device,
+  // without.
+  std::unique_ptr<Tracer> vulkan_tracer(const OpenFile& file, const std::string& what);
 
   // a is `times` faster than b; says so with a warning when the repeats lie too far apart for that.
   double speed_up(const std::string& what, const Timing& a, const Timing& b);

@@ -150,7 +150,10 @@ std::string to_html(const Report& report) {
       escape(report.title) + "</title>\n<style>" + kStyle + "</style>\n<h1>" + escape(report.title) +
       "</h1>\n";
   html += list_html("answers", report.answers);
-  html += list_html("warnings", report.warnings);
+  if (!report.warnings.empty()) {
+    html += "<details><summary>" + std::to_string(report.warnings.size()) + " warnings</summary>\n" +
+            list_html("warnings", report.warnings) + "</details>\n";
+  }
   html += "<nav>";
   for (const Section& section : report.sections) {
     html += "<a href='#" + section.id + "'>" + escape(section.title) + "</a> ";

@@ -28,7 +28,10 @@ std::vector<Structure> structures(bool quick) {
   return all;
 }
 
-const std::vector<Mode> kModes = {{}, {.approximate = true}, {.approximate = true, .near_approximate = true}};
+const std::vector<Mode> kModes = {{},
+                                  {.approximate = true},
+                                  {.approximate = true, .near_skip = true},
+                                  {.approximate = true, .near_approximate = true}};
 
 // Every mode against exact on the same file, on one tracer.
 std::vector<Timing> race_modes(Context& context, Tracer& tracer, const RaySet& set) {
@@ -39,22 +42,6 @@ std::vector<Timing> race_modes(Context& context, Tracer& tracer, const RaySet& s
   }
   return race(contenders, 1, context.repeats());
 }
-
-class VulkanFile : public Tracer {
- public:
-  VulkanFile(VulkanTracer& vulkan, const OpenFile& file) : vulkan_(vulkan) {
-    vulkan.load(file.scene(), LSP_USE_EXACT | LSP_USE_APPROXIMATE);
-  }
-  std::string name() const override { return "Vulkan"; }
-  // In the shader, where the device has timestamps: an engine's rays and hits stay on the device.
-  double trace(const Mode& mode, std::span<const LspRay> rays, std::span<LspHit> hits) override {
-    const VulkanTrace done = vulkan_.trace(mode.options(), rays, hits);
-    return done.gpu_seconds > 0 ? done.gpu_seconds : done.seconds;
-  }
-
- private:
-  VulkanTracer& vulkan_;
-};
 
 void add_structure(Context& context, SceneUnderTest& scene, const Structure& structure, Table& table,
                    const std::vector<RaySet>& sets) {
@@ -69,15 +56,7 @@ void add_structure(Context& context, SceneUnderTest& scene, const Structure& str
   const OpenFile file(baked.path);
   const RaySet& surface = scene.surface(context.accuracy_rays());
   const auto one = cpu_tracer(file, 1), all = cpu_tracer(file, context.threads);
-  std::unique_ptr<Tracer> vulkan;
-  if (context.vulkan) {
-    try {
-      vulkan = std::make_unique<VulkanFile>(*context.vulkan, file);
-    } catch (const Failure& failure) {
-      context.warnings.push_back(scene.name() + ", " + structure.name +
-                                 ": no Vulkan figures: " + failure.what());
-    }
-  }
+  const std::unique_ptr<Tracer> vulkan = context.vulkan_tracer(file, scene.name() + ", " + structure.name);
   std::vector<std::vector<Timing>> times;
   std::vector<std::vector<Timing>> vulkan_times;
   for (const RaySet& set : sets) {

@@ -17,14 +17,10 @@ std::vector<Bake> bakes(bool quick) {
   all.push_back(line_space_bake(2, 12));
   all.push_back(line_space_bake(4, 12));
   all.push_back(line_space_bake(6, 12));
-  all.push_back(line_space_bake(2, 15));
-  all.push_back(line_space_bake(3, 15));
   all.push_back({"N3-D9,12,15", {"--resolution", "3", "--depth", "9,12,15"}});
-  all.push_back({"N6-T8", {"--resolution", "6", "--depth", "9", "--triangles", "8"}});
-  for (const char* preset : {"fast", "balanced", "accurate"}) {
+  for (const char* preset : {"fast", "accurate"}) {
     all.push_back({std::string("preset-") + preset, {"--preset", preset}});
   }
-  all.push_back({"NT6", {"--base", "ntree", "--resolution", "6", "--depth", "2"}});
   return all;
 }
 
@@ -40,14 +36,18 @@ bool has_levels(const OpenFile& file) {
 }
 
 std::vector<Mode> modes_for(const OpenFile& file, bool quick) {
-  std::vector<Mode> modes = {{.approximate = true}, {.approximate = true, .near_approximate = true}};
+  std::vector<Mode> modes = {{.approximate = true},
+                             {.approximate = true, .near_skip = true},
+                             {.approximate = true, .near_approximate = true}};
   if (!has_levels(file)) return modes;
   if (quick) {
     modes.push_back({.approximate = true, .lod = 0.5f});
     return modes;
   }
-  for (const float lod : {0.1f, 0.2f, 0.4f, 0.8f, 1.6f})
+  for (const float lod : {0.25f, 0.5f, 1.0f}) {
     modes.push_back({.approximate = true, .lod = lod});
+    modes.push_back({.approximate = true, .near_skip = true, .lod = lod});
+  }
   return modes;
 }
 
@@ -72,14 +72,55 @@ std::vector<bool> frontier(const std::vector<Sample>& samples, double Sample::*e
 
 // The best speed at no more than `limit` % wrong answers, per scene; 1 (exact) where nothing approximate
 // helps.
-std::map<std::string, Sample> best_within(const std::vector<Sample>& samples, double limit) {
+std::map<std::string, Sample> best_within(const std::vector<Sample>& samples, double limit,
+                                          double Sample::*times) {
   std::map<std::string, Sample> best;
   for (const Sample& sample : samples) {
     const auto [it, fresh] =
         best.try_emplace(sample.scene, Sample{sample.scene, "-", "exact", 1, 1, 0, 0, 0});
-    if (sample.wrong_percent <= limit && sample.times > it->second.times) it->second = sample;
+    if (sample.wrong_percent <= limit && sample.*times > it->second.*times) it->second = sample;
   }
   return best;
+}
+
+// "1.23x (geometric mean; 1.00x to 1.50x)"
+std::string range_of(const std::map<std::string, Sample>& best, double Sample::*times) {
+  double log_sum = 0, least = INFINITY, greatest = 0;
+  for (const auto& [name, sample] : best) {
+    log_sum += std::log(sample.*times);
+    least = std::min(least, sample.*times);
+    greatest = std::max(greatest, sample.*times);
+  }
+  char text[96];
+  std::snprintf(text, sizeof text, "%.2fx (%.2fx to %.2fx)",
+                std::exp(log_sum / static_cast<double>(best.size())), least, greatest);
+  return text;
+}
+
+// What one backend's frontier says, in a sentence each.
+void answer(Context& context, const std::vector<Sample>& samples, double Sample::*times,
+            const std::string& where) {
+  std::string sentence =
+      where +
+      ", shuffled diffuse rays, the fastest approximate trace is, times the exact one (geometric "
+      "mean of " +
+      std::to_string(context.scenes.size()) + " scenes, least to greatest): ";
+  const char* separator = "";
+  for (const double limit : {0.1, 0.5, 1.0, 2.0}) {
+    char share[64];
+    std::snprintf(share, sizeof share, "%sat %g %% wrong answers ", separator, limit);
+    sentence += share + range_of(best_within(samples, limit, times), times);
+    separator = "; ";
+  }
+  context.answers.push_back(sentence + ".");
+  std::string useless;
+  for (const auto& [name, sample] : best_within(samples, 1, times)) {
+    if (sample.*times < 1.1) useless += (useless.empty() ? "" : ", ") + name;
+  }
+  if (!useless.empty()) {
+    context.answers.push_back(
+        where + ", it is not worth using (under 1.1x at 1 % wrong answers) on: " + useless + ".");
+  }
 }
 
 }  // namespace
@@ -94,12 +135,16 @@ Section pareto_suite(Context& context) {
       "or the reverse. On the frontier nothing else is both faster and less often wrong.");
   std::vector<Sample> samples;
   std::vector<Json> rows;
-  const size_t rays = context.timing_rays() / 2;
+  std::vector<std::string> left_out;
+  const size_t rays = context.timing_rays();
   for (const auto& scene : context.scenes) {
     const RaySet set = scene->diffuse(rays, true);
     for (const Bake& how : bakes(context.quick)) {
       const Baked& baked = scene->bake(how);
-      if (!baked.available) continue;
+      if (!baked.available) {
+        left_out.push_back(scene->name() + " " + how.name + " (" + baked.reason + ")");
+        continue;
+      }
       context.progress("pareto: " + scene->name() + " " + how.name);
       const OpenFile file(baked.path);
       if (!file.has_line_spaces() || !file.has_exact_tree()) continue;
@@ -112,7 +157,18 @@ Section pareto_suite(Context& context) {
         contenders.push_back(
             {modes[m].name(), [&, m] { return tracer->trace(modes[m], set.rays, hits[m]); }});
       }
-      const std::vector<Timing> timings = race(contenders, 1, std::max(3, context.repeats() - 2));
+      const std::vector<Timing> timings = race(contenders, 1, 3);
+      std::vector<Timing> on_vulkan;
+      const std::unique_ptr<Tracer> vulkan = context.vulkan_tracer(file, scene->name() + ", " + how.name);
+      if (vulkan) {
+        // A quarter of the rays: a software device takes its time, and the ratio is all that is wanted.
+        const std::span<const LspRay> some = std::span(set.rays).first(set.rays.size() / 4);
+        std::vector<LspHit> out(some.size());
+        std::vector<Contender> others;
+        for (const Mode& mode : modes)
+          others.push_back({mode.name(), [&, mode] { return vulkan->trace(mode, some, out); }});
+        on_vulkan = race(others, 1, 3);
+      }
       for (size_t m = 1; m < modes.size(); ++m) {
         const RayErrors errors = ray_errors(scene->soup(), set.rays, set.truth, hits[m]);
         const Work work =
@@ -121,7 +177,7 @@ Section pareto_suite(Context& context) {
                       how.name,
                       modes[m].name(),
                       timings[0].median / timings[m].median,
-                      0,
+                      on_vulkan.empty() ? 0 : on_vulkan[0].median / on_vulkan[m].median,
                       100 * errors.wrong_share(),
                       100 * errors.depth_diagonal.mean,
                       static_cast<double>(baked.file_bytes) * 1e-6};
@@ -130,6 +186,7 @@ Section pareto_suite(Context& context) {
         row["bake"] = sample.bake;
         row["mode"] = sample.mode;
         row["times"] = sample.times;
+        if (sample.times_vulkan > 0) row["times_vulkan"] = sample.times_vulkan;
         row["mrays"] = mega(set.rays.size(), timings[m]);
         row["spread"] = 100 * timings[m].spread;
         row["file_mb"] = sample.megabytes;
@@ -152,9 +209,11 @@ Section pareto_suite(Context& context) {
                                                          : "";
   }
   Table table{"pareto", "All combinations", "", {}, rows};
-  table.columns = {{"scene", "scene"},         {"bake", "bake"},           {"mode", "mode"},
-                   {"frontier", "frontier"},   {"times", "x exact"},       {"mrays", "Mrays/s"},
-                   {"spread", "spread, %", 1}, {"file_mb", "file, MB", 1}, {"bake_seconds", "bake, s", 1}};
+  table.columns = {{"scene", "scene"},         {"bake", "bake"},
+                   {"mode", "mode"},           {"frontier", "frontier"},
+                   {"times", "x exact"},       {"times_vulkan", "x exact, Vulkan"},
+                   {"mrays", "Mrays/s"},       {"spread", "spread, %", 1},
+                   {"file_mb", "file, MB", 1}, {"bake_seconds", "bake, s", 1}};
   for (const Column& column : error_columns()) table.columns.push_back(column);
   for (const Column& column : {Column{"nodes", "nodes a ray", 1}, Column{"shafts", "look-ups a ray", 1},
                                Column{"triangle_tests", "triangles a ray", 1}}) {
@@ -211,8 +270,7 @@ Section pareto_suite(Context& context) {
                 {"file_mb", "file, MB", 1}},
                {}};
   for (const double limit : {0.1, 0.5, 1.0, 2.0}) {
-    double log_sum = 0, least = INFINITY, greatest = 0, megabytes = 0;
-    const std::map<std::string, Sample> best = best_within(samples, limit);
+    const std::map<std::string, Sample> best = best_within(samples, limit, &Sample::times);
     for (const auto& [name, sample] : best) {
       Json row;
       row["limit"] = limit;
@@ -223,20 +281,19 @@ Section pareto_suite(Context& context) {
       row["wrong_percent"] = sample.wrong_percent;
       if (sample.megabytes > 0) row["file_mb"] = sample.megabytes;
       limits.rows.push_back(row);
-      log_sum += std::log(sample.times);
-      least = std::min(least, sample.times);
-      greatest = std::max(greatest, sample.times);
-      megabytes += sample.megabytes / static_cast<double>(best.size());
     }
-    if (best.empty()) continue;
-    char text[256];
-    std::snprintf(
-        text, sizeof text,
-        "At up to %g %% wrong answers the approximate trace is %.2fx the exact one (geometric mean; %.2fx to "
-        "%.2fx over %zu scenes; CPU, %u threads, shuffled diffuse rays).",
-        limit, std::exp(log_sum / static_cast<double>(best.size())), least, greatest, best.size(),
-        context.threads);
-    context.answers.push_back(text);
+  }
+  if (!samples.empty()) {
+    answer(context, samples, &Sample::times, "On the CPU (" + std::to_string(context.threads) + " threads)");
+    const bool everywhere = std::all_of(samples.begin(), samples.end(),
+                                        [](const Sample& sample) { return sample.times_vulkan > 0; });
+    if (everywhere)
+      answer(context, samples, &Sample::times_vulkan, "On Vulkan (" + context.vulkan->device_name() + ")");
+  }
+  if (!left_out.empty()) {
+    std::string text = "Left out: ";
+    for (size_t i = 0; i < left_out.size(); ++i) text += (i ? "; " : "") + left_out[i];
+    section.paragraphs.push_back(text + ".");
   }
   section.plots = {curve, speed, depth, bytes};
   section.tables = {std::move(limits), std::move(table)};

@@ -45,7 +45,7 @@ float exposure_for(const Image& image) {
 Section pictures_suite(Context& context) {
   Section section{"pictures", "What the error looks like", {}, {}, {}, {}};
   const unsigned truth_samples = context.quick ? 256 : 1024;
-  const std::string size = context.quick ? "64x36" : "160x90";
+  const std::string size = context.quick ? "64x36" : "112x63";
   section.paragraphs.push_back(
       "Against the exact picture of " + std::to_string(truth_samples) +
       " samples a pixel, N = 6, D = 9, near field exact. SSIM and FLIP (67 pixels a degree) are "

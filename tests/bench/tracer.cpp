@@ -61,13 +61,16 @@ lsp_trace_options Mode::options() const {
   if (approximate) options.flags |= LSP_TRACE_APPROXIMATE;
   if (any) options.flags |= LSP_TRACE_ANY_HIT;
   if (near_approximate) options.flags |= LSP_TRACE_NEAR_APPROXIMATE;
+  if (near_skip) options.flags |= LSP_TRACE_NEAR_SKIP;
   options.lod = lod;
   return options;
 }
 
 std::string Mode::name() const {
   if (!approximate) return "exact";
-  std::string text = near_approximate ? "approximate, near too" : "approximate";
+  std::string text = near_approximate ? "approximate, near too"
+                     : near_skip      ? "approximate, near skipped"
+                                      : "approximate";
   if (lod > 0) {
     char number[32];
     std::snprintf(number, sizeof number, ", lod %g", double{lod});

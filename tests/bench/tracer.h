@@ -16,6 +16,7 @@ struct Mode {
   bool approximate = false;
   bool any = false;
   bool near_approximate = false;
+  bool near_skip = false;
   float lod = 0;
 
   lsp_trace_options options() const;

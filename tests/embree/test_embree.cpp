@@ -94,13 +94,14 @@ TEST_P(PaperScene, ApproximateStaysWithinItsPromise) {
   const EmbreeScene embree(soup);
   const std::vector<LspRay> rays = surface_rays(soup, rays_per_scene(), 1);
   const std::vector<LspHit> truth = reference_hits(embree, rays);
-  for (const bool near : {false, true}) {
-    const Mode mode{.approximate = true, .near_approximate = near};
+  for (const Mode& mode : {Mode{.approximate = true}, Mode{.approximate = true, .near_skip = true},
+                           Mode{.approximate = true, .near_approximate = true}}) {
     const RayErrors errors = ray_errors(soup, rays, truth, traced(file, mode, rays));
     std::cout << mode.name() << ": wrong " << 100 * errors.wrong_share() << " % (hits " << errors.wrong_hits
               << ", misses " << errors.wrong_misses << "), depth " << 100 * errors.depth_diagonal.mean
               << " % of the diagonal, normals " << errors.normal_degrees.mean << " degrees\n";
-    if (near) continue;  // the paper's own mode: reported beside the default
+    // The promise is the default's; the two that do less near the origin are reported beside it.
+    if (mode.near_skip || mode.near_approximate) continue;
     EXPECT_LE(errors.wrong_share(), 0.01);
     EXPECT_LE(errors.depth_diagonal.mean, 0.007);
   }
