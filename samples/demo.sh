@@ -43,13 +43,13 @@ if [ ${#meshes[@]} -eq 0 ]; then
   "$bin/lsp-sample-scene" "$out/scene.glb"
   meshes=("$PWD/$out/scene.glb")
   title="the atrium"
-  view=(--camera=-8.1,1.35,0.75:3,2.9,-0.35:64)
+  view=(--camera=-7.9,1.5,-0.9:3,3.1,0.35:66 --exposure 0.3)
 else
   title=$(basename "${meshes[0]}")
 fi
 
 say "baking"
-"$bin/lsp-bake" "${meshes[@]}" -o "$out/scene.lsp" --resolution 4 --depth 9 --json >"$out/bake.json"
+"$bin/lsp-bake" "${meshes[@]}" -o "$out/scene.lsp" --json >"$out/bake.json"
 
 say "validating"
 started=$(date +%s.%N)
@@ -60,7 +60,7 @@ echo "valid, $seconds s"
 
 render() { # render NAME MODE BACKEND
   "$bin/lsp-render" "$out/scene.lsp" -o "$out/$1.png" -o "$out/$1.pfm" --mode "$2" --backend "$3" \
-    --size 640x360 --samples 8 --denoise "${view[@]}" --json >"$out/$1.json"
+    --size 640x360 --samples 4 --denoise "${view[@]}" --json >"$out/$1.json"
 }
 
 say "rendering indirect light, exact and approximate"

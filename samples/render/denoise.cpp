@@ -10,21 +10,46 @@ namespace {
 
 float luminance(glm::vec3 color) { return glm::dot(color, glm::vec3(0.2126f, 0.7152f, 0.0722f)); }
 
-// Variance over a window of 3 x 3: a single pixel's few samples say too little.
+size_t index(int width, int x, int y) {
+  return static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x);
+}
+
+// Variance over a window of 5 x 5: a single pixel's few samples say too little.
 float smoothed_variance(const std::vector<float>& variance, int width, int height, int x, int y) {
+  constexpr float kWindow[3] = {1.0f, 0.6f, 0.2f};
   float sum = 0;
   float weight = 0;
-  for (int dy = -1; dy <= 1; ++dy) {
-    for (int dx = -1; dx <= 1; ++dx) {
+  for (int dy = -2; dy <= 2; ++dy) {
+    for (int dx = -2; dx <= 2; ++dx) {
       const int nx = x + dx;
       const int ny = y + dy;
       if (nx < 0 || ny < 0 || nx >= width || ny >= height) continue;
-      const float w = (dx == 0 ? 2.0f : 1.0f) * (dy == 0 ? 2.0f : 1.0f);
-      sum += w * variance[static_cast<size_t>(ny) * static_cast<size_t>(width) + static_cast<size_t>(nx)];
+      const float w = kWindow[std::abs(dx)] * kWindow[std::abs(dy)];
+      sum += w * variance[index(width, nx, ny)];
       weight += w;
     }
   }
   return sum / weight;
+}
+
+// A pixel brighter than all its neighbours is a lone lucky sample: it is lowered to the brightest of them, or
+// it would be smeared over the whole window.
+Picture without_sparks(const Picture& light) {
+  Picture out = light;
+  tbb::parallel_for(0, light.height, [&](int y) {
+    for (int x = 0; x < light.width; ++x) {
+      float brightest = 0;
+      for (int ny = std::max(y - 1, 0); ny <= std::min(y + 1, light.height - 1); ++ny) {
+        for (int nx = std::max(x - 1, 0); nx <= std::min(x + 1, light.width - 1); ++nx) {
+          if (nx == x && ny == y) continue;
+          brightest = std::max(brightest, luminance(light.pixels[index(light.width, nx, ny)]));
+        }
+      }
+      const float own = luminance(light.pixels[index(light.width, x, y)]);
+      if (own > brightest) out.pixels[index(light.width, x, y)] *= brightest / own;
+    }
+  });
+  return out;
 }
 
 }  // namespace
@@ -33,7 +58,7 @@ Picture denoise(const Picture& light, const std::vector<float>& variance, const 
   const int width = light.width;
   const int height = light.height;
   constexpr float kKernel[3] = {3.0f / 8.0f, 1.0f / 4.0f, 1.0f / 16.0f};
-  Picture current = light;
+  Picture current = without_sparks(light);
   std::vector<float> noise = variance;
   for (int pass = 0; pass < passes; ++pass) {
     const int step = 1 << pass;
@@ -41,7 +66,7 @@ Picture denoise(const Picture& light, const std::vector<float>& variance, const 
     std::vector<float> next_noise(noise.size());
     tbb::parallel_for(0, height, [&](int y) {
       for (int x = 0; x < width; ++x) {
-        const size_t here = static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x);
+        const size_t here = index(width, x, y);
         const float depth = guides.depth[here];
         if (depth <= 0) {
           next.pixels[here] = current.pixels[here];
@@ -61,8 +86,7 @@ Picture denoise(const Picture& light, const std::vector<float>& variance, const 
             const int nx = x + dx * step;
             const int ny = y + dy * step;
             if (nx < 0 || ny < 0 || nx >= width || ny >= height) continue;
-            const size_t there =
-                static_cast<size_t>(ny) * static_cast<size_t>(width) + static_cast<size_t>(nx);
+            const size_t there = index(width, nx, ny);
             if (guides.depth[there] <= 0) continue;
             float w = kKernel[std::abs(dx)] * kKernel[std::abs(dy)];
             if (there != here) {
