@@ -237,13 +237,32 @@ void Device::create_device(const VulkanOptions& options) {
   vkGetPhysicalDeviceFeatures(physical, &available);
   VkPhysicalDeviceFeatures features{};
   features.robustBufferAccess = available.robustBufferAccess;
-  const char* extension = VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME;
+  std::vector<const char*> extensions;
+  if (imports) extensions.push_back(VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME);
+  VkPhysicalDeviceBufferDeviceAddressFeaturesKHR addresses{};
+  addresses.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_BUFFER_DEVICE_ADDRESS_FEATURES_KHR;
+  if (has_extension(physical, VK_KHR_BUFFER_DEVICE_ADDRESS_EXTENSION_NAME)) {
+    VkPhysicalDeviceFeatures2 all{};
+    all.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
+    all.pNext = &addresses;
+    vkGetPhysicalDeviceFeatures2(physical, &all);
+    addresses.bufferDeviceAddressCaptureReplay = VK_FALSE;
+    addresses.bufferDeviceAddressMultiDevice = VK_FALSE;
+    if (addresses.bufferDeviceAddress == VK_TRUE) {
+      extensions.push_back(VK_KHR_BUFFER_DEVICE_ADDRESS_EXTENSION_NAME);
+      address_uses = options.addresses ? LSP_USE_ADDRESSES_ALWAYS : LSP_USE_ADDRESSES_IF_NEEDED;
+    }
+  }
+  if (options.addresses && address_uses == 0) {
+    unsupported("the device has no buffer addresses");
+  }
   VkDeviceCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO;
   info.queueCreateInfoCount = 1;
   info.pQueueCreateInfos = &queue_info;
-  info.enabledExtensionCount = imports ? 1 : 0;
-  info.ppEnabledExtensionNames = &extension;
+  if (address_uses != 0) info.pNext = &addresses;
+  info.enabledExtensionCount = static_cast<uint32_t>(extensions.size());
+  info.ppEnabledExtensionNames = extensions.data();
   info.pEnabledFeatures = &features;
   check(vkCreateDevice(physical, &info, nullptr, &handle), "vkCreateDevice");
   volkLoadDeviceTable(&vk, handle);
@@ -295,6 +314,10 @@ Buffer::Buffer(Device& device, VkDeviceSize bytes, VkBufferUsageFlags usage, VkM
     VkMemoryAllocateInfo allocation{};
     allocation.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO;
     allocation.allocationSize = requirements.size;
+    VkMemoryAllocateFlagsInfo flags{};
+    flags.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO;
+    flags.flags = VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT;
+    if ((usage & VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT) != 0) allocation.pNext = &flags;
     VkResult result = VK_ERROR_OUT_OF_DEVICE_MEMORY;
     int type = -1;
     // The preferred memory may be a small heap: where it is full, what is merely needed will do.

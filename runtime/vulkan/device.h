@@ -51,6 +51,7 @@ class Device {
   VkPhysicalDeviceProperties properties{};
   VkPhysicalDeviceMemoryProperties memory{};
   bool shares_memory = false;     // with the host: importing costs nothing at run time
+  uint32_t address_uses = 0;      // LSP_USE_ADDRESSES_*: whether sections may be read through addresses
   bool imports = false;           // VK_EXT_external_memory_host is on
   double seconds_per_tick = 0.0;  // of timestamps, 0: the queue has none
 

@@ -49,20 +49,25 @@ extern "C" lsp_status lsp_vulkan_plan_buffers(const lsp_scene* scene, uint32_t u
   plan->buffers[0] = {LSP_BINDING_HEADER, 0, 0, sizeof(LspHeader)};
   plan->buffer_count = 1;
   plan->bytes = sizeof(LspHeader);
+  plan->addresses = (uses & LSP_USE_ADDRESSES_ALWAYS) != 0 ? 1 : 0;
   for (const Wanted& wanted : kWanted) {
     if ((uses & wanted.uses) == 0) continue;
     const LspSection* section = find_section(*scene, wanted.section);
     if (section == nullptr || section->bytes == 0) continue;
-    if (section->bytes > limits->max_storage_buffer_range) {
+    const bool too_large = section->bytes > limits->max_storage_buffer_range;
+    if (too_large && (uses & LSP_USE_ADDRESSES_IF_NEEDED) != 0) plan->addresses = 1;
+    if (too_large && plan->addresses == 0) {
       return lsp::fail(error, LSP_ERROR_LIMIT, section->offset,
                        "section %.4s has %llu bytes, storage buffers of this device have at most %llu "
-                       "(maxStorageBufferRange); trace it on the CPU or bake a smaller file",
+                       "(maxStorageBufferRange) and it has no buffer addresses; trace it on the CPU",
                        reinterpret_cast<const char*>(&section->type), print(section->bytes),
                        print(limits->max_storage_buffer_range));
     }
     plan->buffers[plan->buffer_count++] = {wanted.binding, wanted.section, section->offset, section->bytes};
     plan->bytes += section->bytes;
   }
+  plan->usage = LSP_VULKAN_BUFFER_USAGE;
+  if (plan->addresses != 0) plan->usage |= VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT;
   return lsp::succeed(error);
 }
 

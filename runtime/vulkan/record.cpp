@@ -10,6 +10,12 @@ constexpr uint32_t kTraceSpirv[] =
 constexpr uint32_t kTraceCountSpirv[] =
 #include "trace_count.spv.inc"
     ;
+constexpr uint32_t kAddressesSpirv[] =
+#include "trace_addresses.spv.inc"
+    ;
+constexpr uint32_t kAddressesCountSpirv[] =
+#include "trace_addresses_count.spv.inc"
+    ;
 
 template <class Function>
 bool load(VkDevice device, PFN_vkGetDeviceProcAddr get, const char* name, Function* function) {
@@ -55,6 +61,35 @@ extern "C" const uint32_t* lsp_vulkan_trace_spirv(int counting, size_t* bytes) {
   return counting != 0 ? kTraceCountSpirv : kTraceSpirv;
 }
 
+extern "C" const uint32_t* lsp_vulkan_trace_addresses_spirv(int counting, size_t* bytes) {
+  *bytes = counting != 0 ? sizeof kAddressesCountSpirv : sizeof kAddressesSpirv;
+  return counting != 0 ? kAddressesCountSpirv : kAddressesSpirv;
+}
+
+extern "C" void lsp_vulkan_address_table(const lsp_vulkan_plan* plan, const VkDeviceAddress* buffer_addresses,
+                                         VkDeviceAddress table[LSP_VULKAN_ADDRESS_COUNT]) {
+  for (uint32_t i = 0; i < LSP_VULKAN_ADDRESS_COUNT; ++i) table[i] = 0;
+  for (uint32_t i = 0; i < plan->buffer_count; ++i) {
+    const uint32_t binding = plan->buffers[i].binding;
+    if (binding >= LSP_BINDING_NODES && binding <= LSP_BINDING_CANDIDATES) {
+      table[binding - LSP_BINDING_NODES] = buffer_addresses[i];
+    }
+  }
+}
+
+extern "C" void lsp_vulkan_write_address_table(const lsp_vulkan_functions* functions, VkDevice device,
+                                               VkDescriptorSet set, VkBuffer table) {
+  const VkDescriptorBufferInfo info{table, 0, VK_WHOLE_SIZE};
+  VkWriteDescriptorSet write{};
+  write.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
+  write.dstSet = set;
+  write.dstBinding = LSP_BINDING_NODES;
+  write.descriptorCount = 1;
+  write.descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
+  write.pBufferInfo = &info;
+  functions->update_descriptor_sets(device, 1, &write, 0, nullptr);
+}
+
 extern "C" void lsp_vulkan_layout_bindings(VkDescriptorSetLayoutBinding bindings[LSP_BINDING_COUNT]) {
   for (uint32_t i = 0; i < LSP_BINDING_COUNT; ++i) {
     bindings[i] = {i, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr};
@@ -67,7 +102,8 @@ extern "C" void lsp_vulkan_write_descriptors(const lsp_vulkan_functions* functio
                                              VkBuffer counters) {
   VkDescriptorBufferInfo infos[LSP_BINDING_COUNT];
   for (VkDescriptorBufferInfo& info : infos) info = {buffers[0], 0, VK_WHOLE_SIZE};
-  for (uint32_t i = 0; i < plan->buffer_count; ++i) {
+  // With addresses the sections need no descriptors, and may be too large for them.
+  for (uint32_t i = 0; i < plan->buffer_count && plan->addresses == 0; ++i) {
     if (plan->buffers[i].binding < LSP_BINDING_COUNT) infos[plan->buffers[i].binding].buffer = buffers[i];
   }
   infos[LSP_BINDING_RAYS].buffer = rays;

@@ -101,7 +101,7 @@ class Ring {
 };
 
 // Creates a buffer that may lie in imported host memory.
-VkBuffer create_importable(Device& device, uint64_t bytes) {
+VkBuffer create_importable(Device& device, uint64_t bytes, VkBufferUsageFlags usage) {
   VkExternalMemoryBufferCreateInfo external{};
   external.sType = VK_STRUCTURE_TYPE_EXTERNAL_MEMORY_BUFFER_CREATE_INFO;
   external.handleTypes = kHostPointer;
@@ -109,7 +109,7 @@ VkBuffer create_importable(Device& device, uint64_t bytes) {
   info.sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO;
   info.pNext = &external;
   info.size = bytes;
-  info.usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
+  info.usage = usage;
   VkBuffer buffer = VK_NULL_HANDLE;
   check(device.vk.vkCreateBuffer(device.handle, &info, nullptr, &buffer), "vkCreateBuffer");
   return buffer;
@@ -134,6 +134,7 @@ void check_importable(const Device& device) {
 SceneBuffers::SceneBuffers(SceneBuffers&& other) noexcept
     : device_(other.device_),
       plan_(other.plan_),
+      addresses_(std::move(other.addresses_)),
       owned_(std::move(other.owned_)),
       imported_(std::exchange(other.imported_, VK_NULL_HANDLE)),
       bytes_imported_(other.bytes_imported_),
@@ -164,7 +165,8 @@ SceneBuffers SceneBuffers::import_mapping(Device& device, const lsp_scene& scene
   uint32_t types = pointer.memoryTypeBits;
   for (uint32_t i = 0; i < result.plan_.buffer_count; ++i) {
     const lsp_vulkan_buffer& planned = result.plan_.buffers[i];
-    result.handles_[i] = create_importable(device, planned.bytes);
+    result.handles_[i] =
+        create_importable(device, planned.bytes, result.plan_.usage & ~VK_BUFFER_USAGE_TRANSFER_DST_BIT);
     VkMemoryRequirements requirements;
     device.vk.vkGetBufferMemoryRequirements(device.handle, result.handles_[i], &requirements);
     types &= requirements.memoryTypeBits;
@@ -180,6 +182,10 @@ SceneBuffers SceneBuffers::import_mapping(Device& device, const lsp_scene& scene
   import.sType = VK_STRUCTURE_TYPE_IMPORT_MEMORY_HOST_POINTER_INFO_EXT;
   import.handleType = kHostPointer;
   import.pHostPointer = const_cast<void*>(scene.bytes);  // the shaders' buffers are read-only
+  VkMemoryAllocateFlagsInfo flags{};
+  flags.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO;
+  flags.flags = VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT;
+  if (result.plan_.addresses != 0) import.pNext = &flags;
   VkMemoryAllocateInfo allocation{};
   allocation.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO;
   allocation.pNext = &import;
@@ -193,6 +199,7 @@ SceneBuffers SceneBuffers::import_mapping(Device& device, const lsp_scene& scene
                                        result.plan_.buffers[i].file_offset),
           "vkBindBufferMemory");
   }
+  result.write_addresses();
   result.bytes_imported_ = scene.size;
   return result;
 }
@@ -204,7 +211,7 @@ SceneBuffers SceneBuffers::upload(Device& device, const lsp_scene& scene, uint32
   for (uint32_t i = 0; i < result.plan_.buffer_count; ++i) {
     constexpr VkMemoryPropertyFlags kHost =
         VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
-    result.owned_.emplace_back(device, result.plan_.buffers[i].bytes, LSP_VULKAN_BUFFER_USAGE,
+    result.owned_.emplace_back(device, result.plan_.buffers[i].bytes, result.plan_.usage,
                                VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT, staging ? 0 : kHost);
     result.handles_[i] = result.owned_.back().handle();
     mapped = mapped && result.owned_.back().mapped() != nullptr;
@@ -214,8 +221,25 @@ SceneBuffers SceneBuffers::upload(Device& device, const lsp_scene& scene, uint32
   } else {
     result.upload_staged(scene);
   }
+  result.write_addresses();
   result.bytes_uploaded_ = result.plan_.bytes;
   return result;
+}
+
+void SceneBuffers::write_addresses() {
+  if (plan_.addresses == 0) return;
+  VkDeviceAddress buffers[LSP_VULKAN_MAX_BUFFERS] = {};
+  for (uint32_t i = 0; i < plan_.buffer_count; ++i) {
+    VkBufferDeviceAddressInfo info{};
+    info.sType = VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO;
+    info.buffer = handles_[i];
+    buffers[i] = device_->vk.vkGetBufferDeviceAddressKHR(device_->handle, &info);
+  }
+  VkDeviceAddress table[LSP_VULKAN_ADDRESS_COUNT];
+  lsp_vulkan_address_table(&plan_, buffers, table);
+  addresses_ = Buffer(*device_, sizeof table, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT,
+                      VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT, 0);
+  memcpy(addresses_.mapped(), table, sizeof table);
 }
 
 void SceneBuffers::upload_mapped(const lsp_scene& scene) {

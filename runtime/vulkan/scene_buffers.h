@@ -24,17 +24,21 @@ class SceneBuffers {
 
   const lsp_vulkan_plan& plan() const { return plan_; }
   const VkBuffer* handles() const { return handles_; }
+  // The buffer with the sections' addresses; null where the plan does without.
+  VkBuffer addresses() const { return addresses_.handle(); }
   uint64_t bytes_imported() const { return bytes_imported_; }
   uint64_t bytes_uploaded() const { return bytes_uploaded_; }
 
  private:
   explicit SceneBuffers(Device& device) : device_(&device) {}
+  void write_addresses();
   void upload_mapped(const lsp_scene& scene);
   void upload_staged(const lsp_scene& scene);
 
   Device* device_;
   lsp_vulkan_plan plan_{};
   VkBuffer handles_[LSP_VULKAN_MAX_BUFFERS]{};
+  Buffer addresses_;
   std::vector<Buffer> owned_;                 // upload: the buffers behind the handles
   VkDeviceMemory imported_ = VK_NULL_HANDLE;  // import: the one memory behind all buffers
   uint64_t bytes_imported_ = 0;

@@ -1,9 +1,16 @@
 // One ray per invocation: rays from a buffer, hits into another. With LSP_COUNT defined, sums of the work done
 // are added to the counters (struct lsp_trace_counts of lsp.h, less its first field: the host knows the rays).
+// With LSP_ADDRESSES defined, the sections are read through buffer device addresses.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 
+#ifdef LSP_ADDRESSES
+#extension GL_EXT_buffer_reference : require
+#extension GL_EXT_buffer_reference_uvec2 : require
+#include "lsp/lsp_addresses.glsl"
+#else
 #include "lsp/lsp.glsl"
+#endif
 
 layout(local_size_x = 64) in;
 

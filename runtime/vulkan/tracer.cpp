@@ -42,12 +42,14 @@ class Shader {
   Shader(const Shader&) = delete;
   Shader& operator=(const Shader&) = delete;
 
-  // A pipeline for traces with `flags` whose stack has `stack` entries. The caller destroys it.
-  VkPipeline create_pipeline(bool counting, uint32_t flags, uint32_t stack) {
+  // A pipeline for traces with `flags` whose stack has `stack` entries, for a plan with or without addresses.
+  // The caller destroys it.
+  VkPipeline create_pipeline(bool addresses, bool counting, uint32_t flags, uint32_t stack) {
     size_t bytes = 0;
     VkShaderModuleCreateInfo module_info{};
     module_info.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
-    module_info.pCode = lsp_vulkan_trace_spirv(counting ? 1 : 0, &bytes);
+    module_info.pCode = addresses ? lsp_vulkan_trace_addresses_spirv(counting ? 1 : 0, &bytes)
+                                  : lsp_vulkan_trace_spirv(counting ? 1 : 0, &bytes);
     module_info.codeSize = bytes;
     VkShaderModule module = VK_NULL_HANDLE;
     check(device_.vk.vkCreateShaderModule(device_.handle, &module_info, nullptr, &module),
@@ -151,8 +153,8 @@ class Shader {
 // The pipelines for one scene's stack, one for each kind of trace, made when they are first needed.
 class Pipelines {
  public:
-  Pipelines(Device& device, Shader& shader, uint32_t stack)
-      : device_(device), shader_(shader), stack_(stack) {}
+  Pipelines(Device& device, Shader& shader, bool addresses, uint32_t stack)
+      : device_(device), shader_(shader), addresses_(addresses), stack_(stack) {}
   ~Pipelines() {
     for (const auto& [key, pipeline] : made_) device_.vk.vkDestroyPipeline(device_.handle, pipeline, nullptr);
   }
@@ -160,13 +162,14 @@ class Pipelines {
   Pipelines& operator=(const Pipelines&) = delete;
   VkPipeline get(bool counting, uint32_t flags) {
     VkPipeline& pipeline = made_[{counting, flags}];
-    if (pipeline == VK_NULL_HANDLE) pipeline = shader_.create_pipeline(counting, flags, stack_);
+    if (pipeline == VK_NULL_HANDLE) pipeline = shader_.create_pipeline(addresses_, counting, flags, stack_);
     return pipeline;
   }
 
  private:
   Device& device_;
   Shader& shader_;
+  bool addresses_;
   uint32_t stack_;
   std::map<std::pair<bool, uint32_t>, VkPipeline> made_;
 };
@@ -272,7 +275,8 @@ void VulkanTracer::Impl::unload() noexcept {
 // Makes `buffers` the scene and traces one ray, so that a device that cannot read them fails here.
 void VulkanTracer::Impl::attach(SceneBuffers&& buffers) {
   scene_buffers = std::make_unique<SceneBuffers>(std::move(buffers));
-  pipelines_ = std::make_unique<Pipelines>(*device, *shader_, std::max(scene_.header->max_stack, 1u));
+  pipelines_ = std::make_unique<Pipelines>(*device, *shader_, scene_buffers->plan().addresses != 0,
+                                           std::max(scene_.header->max_stack, 1u));
   const LspHeader& header = *scene_.header;
   const LspRay ray{header.bounds_min, 0.0f, {1.0f, 1.0f, 1.0f}, 3.402823e38f};
   LspHit hit;
@@ -304,7 +308,7 @@ void VulkanTracer::Impl::load(const lsp_scene& scene, uint32_t uses, LoadPath pa
   const auto start = std::chrono::steady_clock::now();
   unload();
   scene_ = scene;
-  uses_ = uses;
+  uses_ = uses | device->address_uses;
   load_note.clear();
   // What no way of loading can mend is said before the first is tried.
   lsp_vulkan_plan plan;
@@ -409,6 +413,10 @@ VulkanTrace VulkanTracer::Impl::trace(const lsp_trace_options& wanted, std::span
   lsp_vulkan_write_descriptors(&device->functions, device->handle, shader_->set, &scene_buffers->plan(),
                                scene_buffers->handles(), batch_.shader_rays(), batch_.shader_hits(),
                                counters_.handle());
+  if (scene_buffers->plan().addresses != 0) {
+    lsp_vulkan_write_address_table(&device->functions, device->handle, shader_->set,
+                                   scene_buffers->addresses());
+  }
   for (size_t first = 0; first < rays.size(); first += most) {
     const auto size = static_cast<uint32_t>(std::min<size_t>(rays.size() - first, most));
     result.gpu_seconds += trace_batch(options, &rays[first], &hits[first], size, count);

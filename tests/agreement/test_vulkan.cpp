@@ -261,6 +261,15 @@ TEST_F(Vulkan, SectionOverTheDevicesLimitIsNamed) {
   EXPECT_EQ(lsp_vulkan_plan_buffers(&scene, LSP_USE_EXACT, &limits, &plan, &error), LSP_ERROR_LIMIT);
   EXPECT_NE(std::string(error.message).find("maxStorageBufferRange"), std::string::npos) << error.message;
   EXPECT_NE(std::string(error.message).find("NODE"), std::string::npos) << error.message;
+  // With buffer addresses it is no limit, and they are used for no other reason.
+  constexpr uint32_t kUses = LSP_USE_EXACT | LSP_USE_ADDRESSES_IF_NEEDED;
+  ASSERT_EQ(lsp_vulkan_plan_buffers(&scene, kUses, &limits, &plan, &error), LSP_OK) << error.message;
+  EXPECT_NE(plan.addresses, 0u);
+  EXPECT_NE(plan.usage & VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT, 0u);
+  const lsp_vulkan_limits large{1u << 27, 4096, 65535};
+  ASSERT_EQ(lsp_vulkan_plan_buffers(&scene, kUses, &large, &plan, &error), LSP_OK) << error.message;
+  EXPECT_EQ(plan.addresses, 0u);
+  EXPECT_EQ(plan.usage & VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT, 0u);
 }
 
 // The copies that the plan asks for are each buffer's bytes, once, whatever their size.
@@ -296,10 +305,11 @@ TEST_F(Vulkan, ValidationHasNothingToSay) {
   const lsp_scene scene = open_scene(bytes.data(), bytes.size());
   const std::vector<LspRay> rays = hard_rays(parts, 1000, 5);
   std::vector<LspHit> hits(rays.size());
-  for (const bool discrete : {false, true}) {
+  for (const int kind : {0, 1, 2, 3}) {
     VulkanOptions options;
     options.validation = true;
-    options.discrete = discrete;
+    options.discrete = (kind & 1) != 0;
+    options.addresses = (kind & 2) != 0;
     std::unique_ptr<VulkanTracer> tracer;
     try {
       tracer = std::make_unique<VulkanTracer>(options);
@@ -331,10 +341,14 @@ TEST_F(Vulkan, WildIndicesStayInsideTheBuffers) {
   const Bytes bytes = write_raw(parts);
   const lsp_scene scene = open_scene(bytes.data(), bytes.size());
   std::vector<LspHit> hits(rays.size());
-  VulkanTracer tracer;
-  tracer.load(scene, LSP_USE_EXACT | LSP_USE_APPROXIMATE);
-  tracer.trace({0, 0}, rays, hits);
-  tracer.trace({LSP_TRACE_APPROXIMATE, 0}, rays, hits);
+  for (const bool addresses : {false, true}) {
+    VulkanOptions device;
+    device.addresses = addresses;
+    VulkanTracer tracer(device);
+    tracer.load(scene, LSP_USE_EXACT | LSP_USE_APPROXIMATE);
+    tracer.trace({0, 0}, rays, hits);
+    tracer.trace({LSP_TRACE_APPROXIMATE, 0}, rays, hits);
+  }
   for (const lsp_trace_options& options :
        {lsp_trace_options{0, 0}, lsp_trace_options{LSP_TRACE_APPROXIMATE, 0}}) {
     EXPECT_EQ(lsp_trace(&scene, &options, rays.data(), hits.data(), rays.size(), nullptr, nullptr), LSP_OK);

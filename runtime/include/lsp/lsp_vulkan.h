@@ -9,8 +9,9 @@
  * offset
  *                                                 +-- upload: copies straight from the mapping, in pieces
  *
- * Shaders: include lsp/lsp.glsl in your own and bind the scene's buffers to bindings 0 to 6; or use the ready
- * trace shader here, which reads rays from a buffer and writes hits to another.
+ * Shaders: include lsp/lsp.glsl in your own and bind the scene's buffers to bindings 0 to 6
+ * (lsp_addresses.glsl where a section is too large for a storage buffer); or use the ready trace shader here,
+ * which reads rays from a buffer and writes hits to another.
  *
  * Files that lsp-validate has not passed: switch robustBufferAccess on. lsp_open has checked the file's
  * frame, not the indices inside its sections, and the shader does not check them again.
@@ -33,6 +34,11 @@ extern "C" {
 #define LSP_USE_EXACT 0x1u       /* exact traces: NODE, TRIA, NRML */
 #define LSP_USE_APPROXIMATE 0x2u /* approximate traces: NODE, TRIA, NRML, LSPC, BITS, CAND */
 #define LSP_USE_MATERIALS 0x4u   /* MATL, for the engine's own shaders */
+
+/* And whether sections may be read through buffer device addresses instead of descriptors, where the device's
+ * bufferDeviceAddress feature is on. */
+#define LSP_USE_ADDRESSES_IF_NEEDED 0x100u /* where one is larger than max_storage_buffer_range */
+#define LSP_USE_ADDRESSES_ALWAYS 0x200u    /* for tests: descriptors are faster */
 
 /* Bindings of the trace shader's descriptor set, all storage buffers; 0 to 6 are those of lsp.glsl. */
 typedef enum lsp_vulkan_binding {
@@ -71,14 +77,17 @@ typedef struct lsp_vulkan_buffer {
 typedef struct lsp_vulkan_plan {
   uint32_t buffer_count;
   lsp_vulkan_buffer buffers[LSP_VULKAN_MAX_BUFFERS];
-  uint64_t bytes; /* of all buffers together */
+  uint64_t bytes;           /* of all buffers together */
+  VkBufferUsageFlags usage; /* of every buffer; an imported one can do without the transfer bit */
+  uint32_t addresses; /* nonzero: the sections are read through addresses, see lsp_vulkan_address_table */
 } lsp_vulkan_plan;
 
-/* Usage of every buffer of the plan. An imported one can do without the transfer bit. */
+/* Usage of every buffer of a plan without addresses. */
 #define LSP_VULKAN_BUFFER_USAGE (VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT)
 
 /* Plans the buffers of an open scene for `uses` (LSP_USE_*). LSP_ERROR_UNSUPPORTED when the file lacks what
- * is asked for; LSP_ERROR_LIMIT when a section is larger than a storage buffer of the device may be. */
+ * is asked for; LSP_ERROR_LIMIT when a section is larger than a storage buffer of the device may be
+ * and addresses were not allowed. */
 lsp_status lsp_vulkan_plan_buffers(const lsp_scene* scene, uint32_t uses, const lsp_vulkan_limits* limits,
                                    lsp_vulkan_plan* plan, lsp_error* error);
 
@@ -161,6 +170,9 @@ typedef struct lsp_vulkan_trace_constants {
  */
 const uint32_t* lsp_vulkan_trace_spirv(int counting, size_t* bytes);
 
+/* The same for plans with addresses; the device's bufferDeviceAddress feature must be on. */
+const uint32_t* lsp_vulkan_trace_addresses_spirv(int counting, size_t* bytes);
+
 /* The bindings of its descriptor set layout. */
 void lsp_vulkan_layout_bindings(VkDescriptorSetLayoutBinding bindings[LSP_BINDING_COUNT]);
 
@@ -170,6 +182,15 @@ void lsp_vulkan_layout_bindings(VkDescriptorSetLayoutBinding bindings[LSP_BINDIN
 void lsp_vulkan_write_descriptors(const lsp_vulkan_functions* functions, VkDevice device, VkDescriptorSet set,
                                   const lsp_vulkan_plan* plan, const VkBuffer* buffers, VkBuffer rays,
                                   VkBuffer hits, VkBuffer counters);
+
+/* Plans with addresses: fills the table that the shader reads them from. `buffer_addresses` are those of the
+ * plan's buffers in its order, from vkGetBufferDeviceAddress. The engine puts the table into a storage
+ * buffer, and after lsp_vulkan_write_descriptors points the set at it with lsp_vulkan_write_address_table. */
+#define LSP_VULKAN_ADDRESS_COUNT 6u
+void lsp_vulkan_address_table(const lsp_vulkan_plan* plan, const VkDeviceAddress* buffer_addresses,
+                              VkDeviceAddress table[LSP_VULKAN_ADDRESS_COUNT]);
+void lsp_vulkan_write_address_table(const lsp_vulkan_functions* functions, VkDevice device,
+                                    VkDescriptorSet set, VkBuffer table);
 
 /* Rays that one dispatch can trace on the device. */
 uint32_t lsp_vulkan_max_rays(const lsp_vulkan_limits* limits);

@@ -27,6 +27,7 @@ const char* name_of(LoadPath path);
 struct VulkanOptions {
   std::string device;       // part of the device's name; empty: a GPU if there is one, else what there is
   bool validation = false;  // the Khronos layer, core and synchronization; see validation_messages
+  bool addresses = false;   // read sections through buffer addresses even where descriptors would do
   bool discrete = false;    // treat the device as a discrete GPU: staging buffers, never an import on its own
 };
 
