@@ -84,11 +84,11 @@ void header(Collector& c) {
            [](LspHeader& h) { h.section_table_offset = ~uint64_t{63}; });
   c.header(RuleId::kTableOutside, "section_count is 2^32 - 1",
            [](LspHeader& h) { h.section_count = 0xFFFFFFFFu; });
-  c.raw(RuleId::kTruncated, "the last 256 bytes are missing", [](Bytes& b) { b.resize(b.size() - 256); });
+  c.raw(RuleId::kTruncated, "the last 256 bytes are missing", [](Bytes& b) { b.erase(b.end() - 256, b.end()); });
   c.raw(RuleId::kExtraBytes, "256 zero bytes follow", [](Bytes& b) { b.resize(b.size() + 256); });
   c.header(RuleId::kAlignment, "alignment is 512", [](LspHeader& h) { h.alignment = 512; });
   c.bytes(RuleId::kFileNotPadded, "the padding at the end is 16 bytes short", [](Bytes& b) {
-    b.resize(b.size() - 16);
+    b.erase(b.end() - 16, b.end());
     header_of(b).file_bytes -= 16;
   });
   c.header(RuleId::kBaseStructure, "base_structure is 3", [](LspHeader& h) { h.base_structure = 3; });

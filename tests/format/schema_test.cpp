@@ -1,0 +1,127 @@
+// What lsp-validate --json prints is what report.schema.json describes, for every file of the corpus: the
+// program itself is run, so that its exit codes and streams are tested too.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <regex>
+
+#include "mutations.h"
+#include "scenes.h"
+
+namespace {
+
+using namespace lsp;
+using namespace lsp::corpus;
+using Json = nlohmann::json;
+
+const std::filesystem::path kCorpus = std::filesystem::path(LSP_CORPUS_DIR) / "1.0";
+
+struct Output {
+  int exit = -1;
+  std::string out;
+};
+
+// Runs a program with standard error discarded.
+Output run(const std::string& command) {
+  Output output;
+  FILE* pipe = popen((command + " 2>/dev/null").c_str(), "r");
+  if (pipe == nullptr) return output;
+  char buffer[4096];
+  for (size_t n; (n = fread(buffer, 1, sizeof buffer, pipe)) > 0;) output.out.append(buffer, n);
+  const int status = pclose(pipe);
+  if (WIFEXITED(status)) output.exit = WEXITSTATUS(status);
+  return output;
+}
+
+// The part of JSON Schema that report.schema.json uses. Returns what does not fit, or nothing.
+std::string misfit(const Json& schema, const Json& value, const std::string& path) {
+  static const std::string kKnown[] = {
+      "$schema",    "title", "description", "type",    "required", "additionalProperties",
+      "properties", "enum",  "minimum",     "pattern", "items"};
+  for (const auto& [key, unused] : schema.items())
+    if (std::find(std::begin(kKnown), std::end(kKnown), key) == std::end(kKnown))
+      return path + ": unknown keyword " + key;
+  const std::string type = schema.value("type", "");
+  const bool fits = (type == "object" && value.is_object()) || (type == "array" && value.is_array()) ||
+                    (type == "string" && value.is_string()) ||
+                    (type == "integer" && value.is_number_integer());
+  if (!fits) return path + " is not of type " + type;
+  if (schema.contains("enum") &&
+      std::find(schema["enum"].begin(), schema["enum"].end(), value) == schema["enum"].end())
+    return path + " is " + value.dump();
+  if (schema.contains("minimum") && value.get<int64_t>() < schema["minimum"].get<int64_t>())
+    return path + " is too small";
+  if (schema.contains("pattern") &&
+      !std::regex_search(value.get<std::string>(), std::regex(schema["pattern"].get<std::string>())))
+    return path + " is " + value.dump();
+  for (const Json& name : schema.value("required", Json::array()))
+    if (!value.contains(name.get<std::string>())) return path + " lacks " + name.get<std::string>();
+  if (value.is_object())
+    for (const auto& [name, member] : value.items()) {
+      if (!schema["properties"].contains(name)) return path + " has " + name;
+      if (std::string text = misfit(schema["properties"][name], member, path + "/" + name); !text.empty())
+        return text;
+    }
+  if (value.is_array())
+    for (const Json& item : value)
+      if (std::string text = misfit(schema["items"], item, path + "/*"); !text.empty()) return text;
+  return "";
+}
+
+TEST(Program, ReportsFitTheSchemaAndExitCodesTheReport) {
+  std::ifstream file(std::filesystem::path(LSP_FORMAT_DIR) / "report.schema.json");
+  const Json schema = Json::parse(file);
+  const auto expect = [&](const std::filesystem::path& path, const std::vector<std::string>& arguments,
+                          int exit) {
+    std::string command =
+        "cd " + path.parent_path().string() + " && " + LSP_VALIDATE + " --json " + path.filename().string();
+    for (const std::string& argument : arguments) command += " " + argument;
+    const Output output = run(command);
+    const Json json = Json::parse(output.out, nullptr, false);
+    ASSERT_FALSE(json.is_discarded()) << command << "\n" << output.out;
+    EXPECT_EQ(misfit(schema, json, ""), "") << command;
+    EXPECT_EQ(json["exit"], output.exit) << command;
+    EXPECT_TRUE(exit < 0 || output.exit == exit) << command;
+  };
+  for (const ValidFile& valid : valid_files()) expect(kCorpus / "valid" / (valid.name + ".lsp"), {}, 0);
+  for (const InvalidFile& invalid : invalid_files())
+    expect(kCorpus / "invalid" / (invalid.name + ".lsp"), invalid.arguments, -1);
+}
+
+TEST(Program, SilentOnSuccessAndQuietOnDemand) {
+  const std::string valid = (kCorpus / "valid/full.lsp").string();
+  const std::string invalid = (kCorpus / "invalid/LSP-0503-two-parents.lsp").string();
+  EXPECT_EQ(run(std::string(LSP_VALIDATE) + " " + valid).out, "");
+  EXPECT_NE(run(std::string(LSP_VALIDATE) + " " + invalid).out.find("LSP-0503"), std::string::npos);
+  EXPECT_EQ(run(std::string(LSP_VALIDATE) + " --quiet " + invalid).out, "");
+  EXPECT_EQ(run(std::string(LSP_VALIDATE) + " --quiet " + invalid).exit, 3);
+}
+
+TEST(Program, ExitCodes) {
+  const std::string valid = (kCorpus / "valid/full.lsp").string();
+  const std::string validate = LSP_VALIDATE, info = LSP_INFO;
+  EXPECT_EQ(run(validate).exit, 1);
+  EXPECT_EQ(run(validate + " --no-such-option " + valid).exit, 1);
+  EXPECT_EQ(run(validate + " --level shallow " + valid).exit, 1);
+  EXPECT_EQ(run(validate + " /no/such/file.lsp").exit, 2);
+  EXPECT_EQ(run(validate + " " + LSP_CORPUS_DIR).exit, 2);
+  EXPECT_EQ(run(validate + " " + valid + " --mesh /no/such/mesh.obj").exit, 2);
+  EXPECT_EQ(run(validate + " /dev/null").exit, 2);
+  EXPECT_EQ(run(validate + " --version").exit, 0);
+  EXPECT_EQ(run(validate + " --help").exit, 0);
+  EXPECT_EQ(run(info + " " + valid).exit, 0);
+  EXPECT_EQ(run(info + " --json " + valid).exit, 0);
+  EXPECT_EQ(run(info + " --annotate " + valid).exit, 0);
+  EXPECT_EQ(run(info + " --section NODE " + valid).exit, 0);
+  EXPECT_EQ(run(info + " --section NONE " + valid).exit, 1);
+  EXPECT_EQ(run(info + " " + (kCorpus / "index.json").string()).exit, 3);
+  EXPECT_EQ(run(info + " " + (kCorpus / "invalid/LSP-0104-other-major.lsp").string()).exit, 5);
+  EXPECT_EQ(run(info + " /no/such/file.lsp").exit, 2);
+}
+
+}  // namespace
