@@ -68,6 +68,7 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
   options.effect = parse_effect(arguments.effect);
   options.approximate = arguments.mode == "approximate";
   options.near_approximate = arguments.near_field == "approximate";
+  options.near_skip = arguments.near_field == "skip";
   parse_size(arguments.size, options);
   for (const std::string& output : arguments.outputs) {
     const std::filesystem::path ending = std::filesystem::path(output).extension();
@@ -84,10 +85,6 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
     allowed.emplace(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(options.threads));
   }
   const RenderScene scene(arguments.file);
-  if (options.approximate && !scene.has_line_spaces()) {
-    throw Failure(Exit::kUnsupported, arguments.file,
-                  "has no Line Spaces; bake it with them or use --mode exact");
-  }
   if (!common.quiet) {
     for (const std::string& note : scene.notes())
       std::cerr << program << ": " << arguments.file << ": " << note << "\n";
@@ -171,9 +168,10 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember({"ao", "diffuse", "glossy", "all", "direct"}));
   app.add_option("--mode", a.mode, "exact or approximate (default exact)")
       ->check(CLI::IsMember({"exact", "approximate"}));
-  app.add_option("--near", a.near_field,
-                 "In approximate mode, the Line Space around a ray's origin: exact (default) or approximate")
-      ->check(CLI::IsMember({"exact", "approximate"}));
+  app.add_option(
+         "--near", a.near_field,
+         "In approximate mode, the Line Space around a ray's origin: exact (default), skip or approximate")
+      ->check(CLI::IsMember({"exact", "skip", "approximate"}));
   app.add_option(
          "--lod", a.options.lod,
          "Stop at a Line Space once its diagonal is under LOD times the distance (default 0: deepest only)")

@@ -50,10 +50,6 @@ RenderScene::~RenderScene() { lsp_unmap_file(&mapping_); }
 
 glm::vec3 RenderScene::lo() const { return to_glm(scene_.header->bounds_min); }
 glm::vec3 RenderScene::hi() const { return to_glm(scene_.header->bounds_max); }
-bool RenderScene::has_line_spaces() const {
-  return (scene_.header->required_features & LSP_FEATURE_LINE_SPACES) != 0;
-}
-
 void RenderScene::index_primitives(const std::string& file) {
   const LspHeader& header = *scene_.header;
   // The table has an entry per primitive: a header that declares far more of them than there are triangles

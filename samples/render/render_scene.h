@@ -43,7 +43,6 @@ class RenderScene {
   glm::vec3 lo() const;
   glm::vec3 hi() const;
   float diagonal() const { return glm::length(hi() - lo()); }
-  bool has_line_spaces() const;
   // What the file does not have and what stands in for it; empty if nothing is missing.
   const std::vector<std::string>& notes() const { return notes_; }
 

@@ -81,6 +81,7 @@ class Renderer {
         picture_(options.width, options.height) {
     indirect_flags_ = options.approximate ? LSP_TRACE_APPROXIMATE : 0u;
     if (options.approximate && options.near_approximate) indirect_flags_ |= LSP_TRACE_NEAR_APPROXIMATE;
+    if (options.approximate && options.near_skip) indirect_flags_ |= LSP_TRACE_NEAR_SKIP;
     const size_t pixels = picture_.pixels.size();
     for (size_t c = 0; c < kComponents; ++c) {
       sum_[c] = Picture(options.width, options.height);

@@ -22,6 +22,7 @@ struct RenderOptions {
   Effect effect = Effect::kAll;
   bool approximate = false;       // what indirect rays are traced with
   bool near_approximate = false;  // with approximate: nothing exact near a ray's origin
+  bool near_skip = false;         // with approximate: exact there only where something is ahead
   float lod = 0.0f;               // theta
   int width = 960;
   int height = 540;
