@@ -67,9 +67,8 @@ lsp_status refuse(lsp_error* error, const char* message) {
 extern "C" lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options* options, const LspRay* rays,
                                 LspHit* hits, uint64_t count, lsp_trace_counts* counts, lsp_error* error) {
   const uint32_t features = scene->header->required_features;
-  const bool approximate = (options->flags & LSP_TRACE_APPROXIMATE) != 0;
-  if (approximate && !(features & LSP_FEATURE_LINE_SPACES))
-    return refuse(error, "the file has no Line Spaces, trace it exactly or bake it without --no-line-spaces");
+  const bool approximate =
+      (options->flags & LSP_TRACE_APPROXIMATE) != 0 && (features & LSP_FEATURE_LINE_SPACES) != 0;
   if (!approximate && !(features & LSP_FEATURE_EXACT))
     return refuse(error, "the file has no exact tree, trace it approximately or bake it without --no-exact");
   uint32_t flags = options->flags & (approximate ? LSP_TRACE_ALL_FLAGS : kExactFlags);

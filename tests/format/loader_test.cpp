@@ -23,8 +23,8 @@ void trace(const lsp_scene& scene, const std::string& context) {
   LspHit hits[16];
   const bool exact = header.required_features & LSP_FEATURE_EXACT;
   const bool approximate = header.required_features & LSP_FEATURE_LINE_SPACES;
-  for (uint32_t flags = 0; flags < 8; ++flags) {
-    const bool able = flags & LSP_TRACE_APPROXIMATE ? approximate : exact;
+  for (uint32_t flags = 0; flags <= LSP_TRACE_ALL_FLAGS; ++flags) {
+    const bool able = exact || (approximate && (flags & LSP_TRACE_APPROXIMATE));
     const lsp_trace_options options{flags, flags & LSP_TRACE_NEAR_APPROXIMATE ? 0.5f : 0.0f};
     lsp_trace_counts counts{};
     const lsp_status status = lsp_trace(&scene, &options, rays.data(), hits, 16, &counts, nullptr);
@@ -54,7 +54,7 @@ void expect_agreement(const Bytes& bytes, const std::string& context, uint64_t& 
     if (report.verdict() != Verdict::kValid && opened.scene.header->max_steps < 1000000) {
       LspRay ray = {{0, 1, 0}, 0, {0.1f, 0.2f, 0.3f}, INFINITY};
       LspHit hit;
-      for (uint32_t flags = 0; flags < 8; ++flags) {
+      for (uint32_t flags = 0; flags <= LSP_TRACE_ALL_FLAGS; ++flags) {
         const lsp_trace_options options{flags, 0.25f};
         lsp_trace(&opened.scene, &options, &ray, &hit, 1, nullptr, nullptr);
       }

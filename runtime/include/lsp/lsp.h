@@ -122,7 +122,8 @@ typedef struct lsp_trace_counts {
 } lsp_trace_counts;
 
 /* Traces rays[0, count) into hits[0, count), in this thread. Adds to *counts unless it is NULL.
- * LSP_ERROR_UNSUPPORTED when the file lacks what the options need (no Line Spaces, no exact tree). */
+ * LSP_ERROR_UNSUPPORTED when the file lacks what the options need: an exact tree. A file without Line Spaces
+ * (a scene too small to need them) answers approximate traces exactly. */
 lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options* options, const LspRay* rays,
                      LspHit* hits, uint64_t count, lsp_trace_counts* counts, lsp_error* error);
 

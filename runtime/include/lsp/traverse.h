@@ -421,14 +421,19 @@ LSP_FN LspBest lsp_traverse(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod
   uint ref = LSP_NONE;
   if (root_t <= best.t) ref = lsp_visit(LSP_SCENE_ARG_ s, flags, lod, root, root_line_space, root_lo, root_hi, root_t LSP_COUNTS_ARG);
 
+  /* A device may end every loop early, the inner ones too (lavapipe does), and then only memory tells: what the
+   * compiler knows to hold behind a loop does not. Entry 0 of the stack is LSP_NONE once all work is done. */
   bool done = ref == LSP_NONE;
+  stack_ref[0] = ref;
   for (uint step = 0u; !done && step < LSP_HEADER.max_steps; ++step) {
     bool pop = true;
     if ((ref & LSP_LEAF_BIT) != 0u) {
       uint first = ref & LSP_LEAF_FIRST_MASK;
       uint count = ((ref >> LSP_LEAF_COUNT_SHIFT) & LSP_LEAF_COUNT_MASK) + 1u;
       LSP_COUNT_ADD(triangles, count);
-      for (uint i = 0u; i < count; ++i) lsp_triangle(LSP_SCENE_ARG_ s, first + i, best);
+      uint i = 0u;
+      for (; i < count; ++i) lsp_triangle(LSP_SCENE_ARG_ s, first + i, best);
+      if (i != count) break; /* cut short; not written as i < count, which compilers take to be false here */
     } else if ((ref & LSP_STACK_LINE_SPACE_BIT) != 0u) {
       LSP_COUNT_ADD(shafts, 1u);
       lsp_look_up(LSP_SCENE_ARG_ s, ref & ~LSP_STACK_LINE_SPACE_BIT, best);
@@ -470,17 +475,19 @@ LSP_FN LspBest lsp_traverse(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod
     if (pop) {
       if (any_hit && best.triangle != LSP_NONE) {
         done = true;
+        stack_ref[0] = LSP_NONE;
       } else {
         ref = LSP_NONE;
         while (top > 0u && ref == LSP_NONE) {
           --top;
           if (stack_t[top] <= best.t) ref = stack_ref[top];
         }
-        done = ref == LSP_NONE;
+        done = ref == LSP_NONE && top == 0u;
+        if (done) stack_ref[0] = LSP_NONE;
       }
     }
   }
-  best.complete = done;
+  best.complete = stack_ref[0] == LSP_NONE;
   return best;
 }
 

@@ -31,9 +31,10 @@ void trace_rays(const lsp_scene& scene, uint64_t seed, size_t count, bool valida
     ray.tmax = random.below(4) == 0 ? 1.0f : INFINITY;
     if (random.below(32) == 0) std::memset(&ray, static_cast<int>(random.below(256)), sizeof ray);
   }
-  for (uint32_t flags = 0; flags < 8; ++flags) {
-    const bool able = header.required_features &
-                      (flags & LSP_TRACE_APPROXIMATE ? LSP_FEATURE_LINE_SPACES : LSP_FEATURE_EXACT);
+  for (uint32_t flags = 0; flags <= LSP_TRACE_ALL_FLAGS; ++flags) {
+    const bool able =
+        header.required_features &
+        (flags & LSP_TRACE_APPROXIMATE ? LSP_FEATURE_LINE_SPACES | LSP_FEATURE_EXACT : LSP_FEATURE_EXACT);
     const lsp_trace_options options{flags, random.unit()};
     lsp_trace_counts counts{};
     const lsp_status status =
