@@ -28,6 +28,7 @@ struct Context {
 
   size_t accuracy_rays() const { return quick ? 50000 : 200000; }
   size_t timing_rays() const { return quick ? 1u << 16 : 1u << 17; }
+  Bake base_bake() const { return line_space_bake(quick ? 4 : 6, 9); }  // the only one of a quick run
   int repeats() const { return quick ? 3 : 5; }
 
   // The file on the Vulkan device, until the next call; null, with a warning where there is a device,

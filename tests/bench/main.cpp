@@ -61,7 +61,7 @@ void run(const Arguments& arguments, const sample::CommonOptions& common) {
   }
   for (const std::string& scene : arguments.scenes) {
     context.progress("bake " + scene);
-    context.scenes.push_back(std::make_unique<SceneUnderTest>(scene, context.cache));
+    context.scenes.push_back(std::make_unique<SceneUnderTest>(scene, context.cache, context.base_bake()));
   }
   for (const Suite& suite : kSuites) {
     if (!arguments.suites.empty() &&

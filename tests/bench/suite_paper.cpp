@@ -19,9 +19,9 @@ struct Structure {
   Bake bake;
 };
 
-std::vector<Structure> structures(bool quick) {
-  std::vector<Structure> all = {{"BVH, LS (9)", line_space_bake(6, 9)}};
-  if (quick) return all;
+std::vector<Structure> structures(const Context& context) {
+  std::vector<Structure> all = {{context.quick ? "BVH, LS (9), N = 4" : "BVH, LS (9)", context.base_bake()}};
+  if (context.quick) return all;
   all.push_back({"BVH, LS (12)", line_space_bake(6, 12)});
   all.push_back({"NT (6, 3), LS (2)", {"NT6", {"--base", "ntree", "--resolution", "6", "--depth", "2"}}});
   all.push_back({"NT (10, 3), LS (2)", {"NT10", {"--base", "ntree", "--resolution", "10", "--depth", "2"}}});
@@ -205,7 +205,7 @@ Section paper_suite(Context& context) {
     context.progress("paper: " + scene->name());
     const std::vector<RaySet> sets = {scene->diffuse(context.timing_rays(), false),
                                       scene->diffuse(context.timing_rays(), true)};
-    for (const Structure& structure : structures(context.quick)) {
+    for (const Structure& structure : structures(context)) {
       add_structure(context, *scene, structure, table, sets);
     }
     add_load(context, *scene, loads);

@@ -10,10 +10,10 @@
 namespace lsp::bench {
 namespace {
 
-std::vector<Bake> bakes(bool quick) {
+std::vector<Bake> bakes(const Context& context) {
+  if (context.quick) return {context.base_bake()};
   std::vector<Bake> all = {line_space_bake(4, 9), line_space_bake(6, 9)};
   all.push_back({"N4-D6,9,12", {"--resolution", "4", "--depth", "6,9,12"}});
-  if (quick) return all;
   all.push_back(line_space_bake(2, 12));
   all.push_back(line_space_bake(4, 12));
   all.push_back(line_space_bake(6, 12));
@@ -139,7 +139,7 @@ Section pareto_suite(Context& context) {
   const size_t rays = context.timing_rays();
   for (const auto& scene : context.scenes) {
     const RaySet set = scene->diffuse(rays, true);
-    for (const Bake& how : bakes(context.quick)) {
+    for (const Bake& how : bakes(context)) {
       const Baked& baked = scene->bake(how);
       if (!baked.available) {
         left_out.push_back(scene->name() + " " + how.name + " (" + baked.reason + ")");

@@ -48,7 +48,8 @@ Section pictures_suite(Context& context) {
   const std::string size = context.quick ? "64x36" : "112x63";
   section.paragraphs.push_back(
       "Against the exact picture of " + std::to_string(truth_samples) +
-      " samples a pixel, N = 6, D = 9, near field exact. SSIM and FLIP (67 pixels a degree) are "
+      " samples a pixel, N = " + (context.quick ? "4" : "6") +
+      ", D = 9, near field exact. SSIM and FLIP (67 pixels a degree) are "
       "of display values at one exposure a scene and effect; RMSE and bias of linear light, for ambient "
       "occlusion in [0, 1]. The same random numbers drive exact and approximate pictures, so their "
       "difference at many samples is the approximation's alone.");

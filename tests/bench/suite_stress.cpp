@@ -43,21 +43,21 @@ const std::vector<StressCase>& stress_cases() {
          }
          return t;
        }},
-      {"20,000 needles",
+      {"5,000 needles",
        [] {
          Triangles t;
          Random random(1);
-         for (int i = 0; i < 20000; ++i) {
+         for (int i = 0; i < 5000; ++i) {
            const glm::vec3 a = random_point(random, 1), b = random_point(random, 1);
            t.push_back({a, b, a + 0.0005f * random_point(random, 1)});
          }
          return t;
        }},
-      {"20,000 random triangles, any size",
+      {"5,000 random triangles, any size",
        [] {
          Triangles t;
          Random random(2);
-         for (int i = 0; i < 20000; ++i) {
+         for (int i = 0; i < 5000; ++i) {
            const glm::vec3 a = random_point(random, 1);
            const float size = std::pow(10.0f, static_cast<float>(-3 * random.uniform()));
            t.push_back({a, a + random_point(random, size), a + random_point(random, size)});
