@@ -1,13 +1,13 @@
 // The tree: references, order, boxes, declared bounds, and the Line Space references beside them.
 //
-// A child's index is greater than its parent's, so one pass down the array, from the last node to the first,
-// sees every subtree whole before the node above it: no recursion, no stack that a hostile file could
-// overflow, and every node is touched while its children are still in the cache.
+// Nodes are in depth-first order, so one pass down the array, from the last node to the first, finds the
+// subtrees of a node's children on top of a stack, child 0 above child 1. There is no recursion, a sound file
+// needs a stack of its depth, and any other order shows as a child that is not on top.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstring>
 #include <limits>
-#include <memory>
 
 #include "layers.h"
 
@@ -30,15 +30,24 @@ struct Run {
 };
 
 struct Subtree {
-  uint32_t node_end = 0;  // one past its last node
-  uint32_t height = 0;    // edges to its deepest leaf
+  uint32_t node = 0;    // its first
+  uint32_t height = 0;  // edges to its deepest leaf
   Run triangles;
   Run line_spaces;
 };
 
+// A box as two vectors of four; the fourth numbers are of no meaning (a node has its references there).
 struct Box {
-  lsp_float3 lo, hi;
+  typedef float Vector __attribute__((vector_size(16)));
+  Vector lo, hi;
 };
+
+Box load_box(const float* lo, const float* hi) {
+  Box box;
+  std::memcpy(&box.lo, lo, sizeof box.lo);
+  std::memcpy(&box.hi, hi, sizeof box.hi);
+  return box;
+}
 
 // One child of a node, or the root.
 struct Slot {
@@ -51,16 +60,15 @@ struct Slot {
 };
 
 // Whether `inner` lies in `outer` and neither is inside out; false where a number is NaN. With a finite outer
-// box, true says that the inner one is finite too. One branch for all twelve comparisons.
+// box, true says that the inner one is finite too.
 inline bool nested(const Box& outer, const Box& inner) {
-  return static_cast<int>(outer.lo.x <= inner.lo.x) & static_cast<int>(outer.lo.y <= inner.lo.y) &
-         static_cast<int>(outer.lo.z <= inner.lo.z) & static_cast<int>(inner.lo.x <= inner.hi.x) &
-         static_cast<int>(inner.lo.y <= inner.hi.y) & static_cast<int>(inner.lo.z <= inner.hi.z) &
-         static_cast<int>(inner.hi.x <= outer.hi.x) & static_cast<int>(inner.hi.y <= outer.hi.y) &
-         static_cast<int>(inner.hi.z <= outer.hi.z);
+  const auto inside = (outer.lo <= inner.lo) & (inner.lo <= inner.hi) & (inner.hi <= outer.hi);
+  return (inside[0] & inside[1] & inside[2]) != 0;
 }
 
-bool finite(const lsp_float3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+bool finite(const Box::Vector& v) {
+  return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]);
+}
 
 class TreeCheck {
  public:
@@ -75,8 +83,7 @@ class TreeCheck {
   void run() {
     has_parent_.assign(nodes_.size(), false);
     line_space_seen_.assign(line_spaces_.size(), false);
-    subtrees_ = std::make_unique_for_overwrite<Subtree[]>(nodes_.size());
-    for (uint64_t i = nodes_.size(); i-- > 0;) subtrees_[i] = check_node(i);
+    for (uint64_t i = nodes_.size(); i-- > 0;) stack_.push_back(check_node(i));
     check_root();
     check_unused();
   }
@@ -84,8 +91,8 @@ class TreeCheck {
  private:
   Slot slot(uint64_t i, int side) const {
     const LspNode& node = nodes_[i];
-    return side == 0 ? Slot{node.child0, node.line_space0, i, 0, {node.lo0, node.hi0}}
-                     : Slot{node.child1, node.line_space1, i, 1, {node.lo1, node.hi1}};
+    return side == 0 ? Slot{node.child0, node.line_space0, i, 0, load_box(&node.lo0.x, &node.hi0.x)}
+                     : Slot{node.child1, node.line_space1, i, 1, load_box(&node.lo1.x, &node.hi1.x)};
   }
 
   enum class Field { kChild, kLineSpace, kBox };
@@ -115,7 +122,7 @@ class TreeCheck {
 
   Subtree check_node(uint64_t i) {
     Subtree subtree;
-    subtree.node_end = static_cast<uint32_t>(i + 1);
+    subtree.node = static_cast<uint32_t>(i);
     const Slot first = slot(i, 0), second = slot(i, 1);
     if (first.empty() && second.empty()) [[unlikely]]
       find_node(RuleId::kNodeEmpty, i, "has nothing below it");
@@ -131,8 +138,8 @@ class TreeCheck {
       if (at.line_space != LSP_NONE) inside.triangles = left_out(at);
     } else if (at.child & LSP_LEAF_BIT) {
       inside.triangles = leaf(at);
-    } else if (link(at, above)) {
-      inside = subtrees_[at.child];
+    } else if (link(at)) {
+      inside = take(at);
       check_nesting(at);
     }
     if (!at.empty()) above.height = std::max(above.height, inside.height + 1);
@@ -170,8 +177,8 @@ class TreeCheck {
     return {};
   }
 
-  // A reference to a node; false where it is unsound. `above` is the subtree so far.
-  bool link(const Slot& at, Subtree& above) {
+  // A reference to a node; false where it is unsound.
+  bool link(const Slot& at) {
     if (at.side < 0) return !nodes_.empty() && at.child == 0;
     if (at.child >= nodes_.size()) [[unlikely]]
       return unsound(RuleId::kChildOutOfRange, at, " of " + std::to_string(nodes_.size()));
@@ -180,11 +187,31 @@ class TreeCheck {
     if (has_parent_[at.child]) [[unlikely]]
       return unsound(RuleId::kTwoParents, at, ", which is the child of another node too");
     has_parent_[at.child] = true;
-    if (at.child != above.node_end) [[unlikely]]
-      find(RuleId::kNotDepthFirst, at, Field::kChild,
-           "names node " + std::to_string(at.child) + ", depth-first order asks for " +
-               std::to_string(above.node_end));
-    above.node_end = std::max(above.node_end, subtrees_[at.child].node_end);
+    return true;
+  }
+
+  // Takes the subtree of a sound reference off the stack.
+  Subtree take(const Slot& at) {
+    if (stack_.empty() || stack_.back().node != at.child) [[unlikely]]
+      if (!find_below(at)) return {};
+    const Subtree subtree = stack_.back();
+    stack_.pop_back();
+    return subtree;
+  }
+
+  // Nodes out of order: looks for the child among the last few subtrees and drops those above it, so that one
+  // mistake does not make every node above it another. False when it is not there.
+  [[gnu::cold]] bool find_below(const Slot& at) {
+    constexpr size_t kReach = 64;
+    if (at.side >= 0)
+      find(
+          RuleId::kNotDepthFirst, at, Field::kChild,
+          "names node " + std::to_string(at.child) + ", which does not follow what is before it depth first");
+    const auto last = std::find_if(stack_.rbegin(),
+                                   stack_.rbegin() + static_cast<ptrdiff_t>(std::min(kReach, stack_.size())),
+                                   [&](const Subtree& subtree) { return subtree.node == at.child; });
+    if (last == stack_.rbegin() + static_cast<ptrdiff_t>(std::min(kReach, stack_.size()))) return false;
+    stack_.erase(last.base(), stack_.end());
     return true;
   }
   [[gnu::cold]] bool unsound(RuleId id, const Slot& at, const std::string& what) {
@@ -205,7 +232,7 @@ class TreeCheck {
     const Box& box = at.box;
     if (!finite(box.lo) || !finite(box.hi))
       find(RuleId::kBoxNotFinite, at, Field::kBox, "a corner of the box is not finite");
-    else if (box.lo.x > box.hi.x || box.lo.y > box.hi.y || box.lo.z > box.hi.z)
+    else if (box.lo[0] > box.hi[0] || box.lo[1] > box.hi[1] || box.lo[2] > box.hi[2])
       find(RuleId::kBoxNotFinite, at, Field::kBox, "the box is inside out");
     else if (finite(outer.lo) && finite(outer.hi))  // else the outer box has a finding of its own
       find(RuleId::kBoxOutsideParent, at, Field::kBox, "the box reaches outside its parent's");
@@ -268,10 +295,11 @@ class TreeCheck {
 
   // The root, and what the header declares about the whole tree.
   void check_root() {
-    const Slot root{header_.root, header_.root_line_space, 0, -1, {header_.bounds_min, header_.bounds_max}};
+    const uint32_t deepest = stack_.empty() ? 0 : stack_.back().height;  // of node 0
+    const Slot root{header_.root, header_.root_line_space, 0, -1,
+                    load_box(&header_.bounds_min.x, &header_.bounds_max.x)};
     Subtree whole;
     check_slot(root, whole);
-    const uint32_t deepest = nodes_.empty() ? 0 : subtrees_[0].height;
     if (deepest > header_.max_depth)
       report_.add(
           RuleId::kDepthExceeded, offsetof(LspHeader, max_depth), 4, "/header/max_depth",
@@ -310,7 +338,7 @@ class TreeCheck {
   [[gnu::cold]] void find_unreachable(uint64_t i) {
     find_node(RuleId::kUnreachable, i, "no node before it refers to it");
     constexpr float kInfinity = std::numeric_limits<float>::infinity();
-    const Box everything{{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
+    const Box everything{{-kInfinity, -kInfinity, -kInfinity, 0}, {kInfinity, kInfinity, kInfinity, 0}};
     for (int side : {0, 1})
       if (const Slot inner = slot(i, side); !inner.empty()) explain_box(inner, everything);
   }
@@ -323,8 +351,8 @@ class TreeCheck {
   bool exact_;
   std::vector<bool> has_parent_;
   std::vector<bool> line_space_seen_;
-  std::unique_ptr<Subtree[]> subtrees_;  // of the nodes that were passed
-  uint64_t ends_ = 0;                    // leaves, and Line Spaces that stand for a subtree left out
+  std::vector<Subtree> stack_;  // of nodes that no node before them has taken yet
+  uint64_t ends_ = 0;           // leaves, and Line Spaces that stand for a subtree left out
 };
 
 }  // namespace
