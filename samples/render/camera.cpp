@@ -13,18 +13,16 @@ namespace {
 
 constexpr float kPi = 3.14159265358979324f;
 
-// Free distances from `origin` along `directions`, exact; misses are infinite.
-std::vector<float> free_distances(RayTracer& tracer, glm::vec3 origin,
-                                  const std::vector<glm::vec3>& directions) {
+// What is seen from `origin` along `directions`, exactly.
+std::vector<LspHit> look_around(RayTracer& tracer, glm::vec3 origin,
+                                const std::vector<glm::vec3>& directions) {
   std::vector<LspRay> rays;
   for (const glm::vec3& d : directions) {
     rays.push_back({from_glm(origin), 0.0f, from_glm(d), std::numeric_limits<float>::infinity()});
   }
   std::vector<LspHit> hits(rays.size());
   tracer.trace({0, 0.0f}, rays, hits);
-  std::vector<float> distances;
-  for (const LspHit& hit : hits) distances.push_back(hit.t);
-  return distances;
+  return hits;
 }
 
 }  // namespace
@@ -69,22 +67,27 @@ Camera default_camera(const RenderScene& scene, RayTracer& tracer) {
   const glm::vec3 size = scene.hi() - scene.lo();
   const glm::vec3 centre = 0.5f * (scene.lo() + scene.hi());
   const float diagonal = scene.diagonal();
-  const glm::vec3 inside(centre.x, scene.lo().y + 0.4f * size.y, centre.z);
+  const glm::vec3 inside(centre.x, scene.lo().y + 0.3f * size.y, centre.z);
 
   std::vector<glm::vec3> around;
   for (int i = 0; i < 64; ++i) {
     const float angle = 2.0f * kPi * static_cast<float>(i) / 64.0f;
     around.emplace_back(std::cos(angle), 0.0f, std::sin(angle));
   }
-  const std::vector<float> free = free_distances(tracer, inside, around);
+  const std::vector<LspHit> seen = look_around(tracer, inside, around);
+  std::vector<float> free;
   size_t walls = 0;
+  size_t facing = 0;
   size_t wide = 0;
-  for (const float distance : free) {
-    if (std::isfinite(distance)) ++walls;
-    if (distance > 0.12f * diagonal) ++wide;
+  for (size_t i = 0; i < seen.size(); ++i) {
+    free.push_back(seen[i].t);
+    if (std::isfinite(seen[i].t)) ++walls;
+    if (std::isfinite(seen[i].t) && glm::dot(to_glm(seen[i].normal), around[i]) < 0) ++facing;
+    if (seen[i].t > 0.04f * diagonal) ++wide;
   }
-  // A hall has walls nearly all around, most of them some way off. A solid body has its own skin near.
-  if (walls > 56 && wide > 24) {
+  // A hall has walls nearly all around that face inwards, most of them some way off. The skin of a solid body
+  // faces away from whoever is inside.
+  if (walls >= 48 && 3 * facing > 2 * walls && wide >= 32) {
     size_t best = 0;
     float best_length = -1.0f;
     for (size_t i = 0; i < free.size(); ++i) {

@@ -22,7 +22,7 @@ struct Camera {
 Camera parse_camera(const std::string& text);
 std::string to_string(const Camera& camera);
 
-// Inside a hall it stands where it sees far, at two fifths of the height; otherwise it looks at the whole
+// Inside a hall it stands where it sees far, at three tenths of the height; otherwise it looks at the whole
 // from the front, right and above. y is up.
 Camera default_camera(const RenderScene& scene, RayTracer& tracer);
 
