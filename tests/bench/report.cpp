@@ -15,7 +15,7 @@ constexpr const char* kStyle = R"(
 body{font:16px/1.5 system-ui,sans-serif;max-width:60rem;margin:0 auto;padding:1rem}
 h1{font-size:1.5rem;line-height:1.2}h2{margin-top:2.5rem;border-bottom:1px solid var(--line)}
 h3{font-size:1rem;margin:1.5rem 0 .3rem}figure{margin:1rem 0}figcaption,.caption{font-size:.875rem;opacity:.8}
-svg{width:100%;height:auto;max-width:46rem}img{max-width:100%;height:auto;image-rendering:auto}
+svg{width:100%;height:auto;max-width:46rem}img{width:100%;height:auto;image-rendering:pixelated}
 .scroll{overflow-x:auto}table{border-collapse:collapse;font-size:.875rem;font-variant-numeric:tabular-nums}
 th,td{padding:.25rem .6rem;text-align:right;border-bottom:1px solid var(--line);white-space:nowrap}
 th:first-child,td:first-child{text-align:left;position:sticky;left:0;background:Canvas}
