@@ -100,8 +100,8 @@ class Builder {
       const double leaf_cost = options_.triangle_cost * double(count) * area;
       const bool use_spatial = spatial.cost < object.cost && spatial.left + spatial.right <= count + spare &&
                                spatial.left && spatial.right;
-      const double split_cost = options_.traversal_cost * area + (use_spatial ? spatial.cost : object.cost);
-      if (count <= options_.max_leaf_triangles && leaf_cost <= split_cost) return make_leaf(node, references);
+      const double cost = options_.traversal_cost * area + (use_spatial ? spatial.cost : object.cost);
+      if (count <= options_.max_leaf_triangles && leaf_cost <= cost) return make_leaf(node, references);
       if (use_spatial) {
         split_spatially(references, spatial, left, right);
         // Both sides of a plane may end up with everything when slivers lie along it.
@@ -150,6 +150,29 @@ class Builder {
       progress_(std::min(1.0, double(before) / double(mesh_.triangles.size())));
   }
 
+  // Calls f(b, box of the bins below b, box of the others) for every border between two bins.
+  template <typename F>
+  static void sweep(const std::array<Box, kBins>& boxes, F&& f) {
+    std::array<Box, kBins> right;
+    Box box;
+    for (int b = kBins - 1; b > 0; --b) {
+      box.grow(boxes[b]);
+      right[b] = box;
+    }
+    box = Box();
+    for (int b = 1; b < kBins; ++b) {
+      box.grow(boxes[b - 1]);
+      f(b, box, right[b]);
+    }
+  }
+
+  // Of the children; infinite where one would be empty.
+  double split_cost(size_t left, const Box& left_box, size_t right, const Box& right_box) const {
+    if (left == 0 || right == 0) return INFINITY;
+    return options_.triangle_cost *
+           (double(left) * left_box.half_area() + double(right) * right_box.half_area());
+  }
+
   ObjectSplit find_object_split(const std::vector<Reference>& references) const {
     Box centroids;
     for (const Reference& r : references) centroids.grow(r.box.centre());
@@ -164,23 +187,12 @@ class Builder {
         boxes[b].grow(r.box);
         ++counts[b];
       }
-      std::array<Box, kBins> right_boxes;
-      Box box;
-      for (int b = kBins - 1; b > 0; --b) {
-        box.grow(boxes[b]);
-        right_boxes[b] = box;
-      }
-      box = Box();
       size_t left = 0;
-      for (int b = 1; b < kBins; ++b) {
-        box.grow(boxes[b - 1]);
+      sweep(boxes, [&](int b, const Box& left_box, const Box& right_box) {
         left += counts[b - 1];
-        const size_t right = references.size() - left;
-        if (left == 0 || right == 0) continue;
-        const double cost = options_.triangle_cost *
-                            (double(left) * box.half_area() + double(right) * right_boxes[b].half_area());
-        if (cost < best.cost) best = {cost, axis, b, intersection(box, right_boxes[b])};
-      }
+        const double cost = split_cost(left, left_box, references.size() - left, right_box);
+        if (cost < best.cost) best = {cost, axis, b, intersection(left_box, right_box)};
+      });
     }
     return best;
   }
@@ -243,24 +255,14 @@ class Builder {
         ++entries[first];
         ++exits[last];
       }
-      std::array<Box, kBins> right_boxes;
-      Box box;
-      for (int b = kBins - 1; b > 0; --b) {
-        box.grow(boxes[b]);
-        right_boxes[b] = box;
-      }
-      box = Box();
       size_t left = 0, exited = 0;
-      for (int b = 1; b < kBins; ++b) {
-        box.grow(boxes[b - 1]);
+      sweep(boxes, [&](int b, const Box& left_box, const Box& right_box) {
         left += entries[b - 1];
         exited += exits[b - 1];
         const size_t right = references.size() - exited;
-        if (left == 0 || right == 0) continue;
-        const double cost = options_.triangle_cost *
-                            (double(left) * box.half_area() + double(right) * right_boxes[b].half_area());
+        const double cost = split_cost(left, left_box, right, right_box);
         if (cost < best.cost) best = {cost, axis, bin.plane(b), left, right};
-      }
+      });
     }
     return best;
   }

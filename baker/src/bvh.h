@@ -17,6 +17,10 @@ struct BvhOptions {
   uint32_t max_leaf_triangles = 4;  // 1 to LSP_MAX_LEAF_TRIANGLES
   double traversal_cost = 1.0;      // of a node's two boxes
   double triangle_cost = 1.0;       // of a triangle test
+  // On by default: a closest ray of the benchmark visits, with against without them, 19.9 / 29.3 nodes on
+  // Sponza (13 % more references), 17.6 / 22.5 in the conference room (10 %), 22.6 / 25.1 in Sibenik (15
+  // %), 32.3 / 33.5 on the dragon (7 %), 22.9 / 23.0 on the bunny (1 %). The build takes two to three times
+  // as long.
   bool spatial_splits = true;
   // References that spatial splits may add, as a share of the triangles.
   double split_budget = 0.3;
