@@ -176,61 +176,54 @@ class Filler {
       const glm::vec3 b = patch_point(lo_, hi_, out, q, n, s.out_x, s.out_y);
       return {f3(a), 0.0f, f3(b - a), 1.0f};
     };
-    const auto trace_all = [&] {
-      hits_.resize(rays_.size());
-      if (lsp_trace(&scene_, &trace, rays_.data(), hits_.data(), rays_.size(), nullptr, nullptr) != LSP_OK)
-        throw Failure(Exit::kInternal, "", "the tracer refused the baker's own tree");
-    };
-    rays_.clear();
-    for (uint32_t q = 0; q < patches; ++q)
-      for (uint32_t i = 0; i < first; ++i) rays_.push_back(ray(q, samples[i]));
-    trace_all();
-    if (all == 1) {
-      for (uint32_t q = 0; q < patches; ++q) row[q] = hits_[q].primitive;
-      return;
-    }
-    unsettled_.clear();
+    rays_.resize(all);
+    hits_.resize(all);
     for (uint32_t q = 0; q < patches; ++q) {
+      for (uint32_t i = 0; i < first; ++i) rays_[i] = ray(q, samples[i]);
+      trace_samples(trace, 0, first);
+      if (all == 1) {
+        row[q] = hits_[0].primitive;
+        continue;
+      }
       float cost;
-      row[q] = choose(&rays_[q * first], &hits_[q * first], first, cost);
-      if (cost > kSettled * float(first)) unsettled_.push_back(q);
-    }
-    if (first == all || unsettled_.empty()) return;
-    rays_.clear();
-    for (const uint32_t q : unsettled_)
-      for (const Sample& s : samples) rays_.push_back(ray(q, s));
-    trace_all();
-    for (size_t i = 0; i < unsettled_.size(); ++i) {
-      float cost;
-      row[unsettled_[i]] = choose(&rays_[i * all], &hits_[i * all], all, cost);
+      row[q] = choose(first, cost);
+      if (first == all || cost <= kSettled * float(first)) continue;
+      for (uint32_t i = first; i < all; ++i) rays_[i] = ray(q, samples[i]);
+      trace_samples(trace, first, all);
+      row[q] = choose(all, cost);
     }
   }
 
-  // The triangle among those hit, or none, whose plane answers the rays of a shaft with the smallest sum of
-  // errors: the distance along the ray where both hit, all of it where only one does.
-  uint32_t choose(const LspRay* rays, const LspHit* hits, uint32_t count, float& best_cost) const {
+  void trace_samples(const lsp_trace_options& trace, uint32_t begin, uint32_t end) {
+    if (lsp_trace(&scene_, &trace, &rays_[begin], &hits_[begin], end - begin, nullptr, nullptr) != LSP_OK)
+      throw Failure(Exit::kInternal, "", "the tracer refused the baker's own tree");
+  }
+
+  // The triangle among those hit, or none, whose plane answers the first `count` rays with the smallest sum
+  // of errors: the distance along the ray where both hit, all of it where only one does.
+  uint32_t choose(uint32_t count, float& best_cost) const {
     best_cost = 0;
-    for (uint32_t i = 0; i < count; ++i) best_cost += hits[i].primitive != LSP_NONE ? 1.0f : 0.0f;
+    for (uint32_t i = 0; i < count; ++i) best_cost += hits_[i].primitive != LSP_NONE ? 1.0f : 0.0f;
     uint32_t best = LSP_NONE;
     if (best_cost == 0) return best;
     for (uint32_t c = 0; c < count; ++c) {
-      if (hits[c].primitive == LSP_NONE) continue;
-      const LspTriangle& tri = scene_.triangles[hits[c].primitive];
+      if (hits_[c].primitive == LSP_NONE) continue;
+      const LspTriangle& tri = scene_.triangles[hits_[c].primitive];
       const glm::vec3 v0 = vec(tri.v0);
       const glm::vec3 n = glm::cross(vec(tri.v1) - v0, vec(tri.v2) - v0);
       float cost = 0;
       for (uint32_t i = 0; i < count && cost < best_cost; ++i) {
-        const float t = glm::dot(v0 - vec(rays[i].origin), n) / glm::dot(vec(rays[i].direction), n);
+        const float t = glm::dot(v0 - vec(rays_[i].origin), n) / glm::dot(vec(rays_[i].direction), n);
         const bool plane_hit = t >= 0 && t <= 1;
-        const bool hit = hits[i].primitive != LSP_NONE;
+        const bool hit = hits_[i].primitive != LSP_NONE;
         if (plane_hit && hit)
-          cost += std::fabs(t - hits[i].t);
+          cost += std::fabs(t - hits_[i].t);
         else if (plane_hit != hit)
           cost += 1;
       }
       if (cost < best_cost) {
         best_cost = cost;
-        best = hits[c].primitive;
+        best = hits_[c].primitive;
       }
     }
     return best;
@@ -297,7 +290,6 @@ class Filler {
   glm::vec3 lo_, hi_;
   std::vector<LspRay> rays_;
   std::vector<LspHit> hits_;
-  std::vector<uint32_t> unsettled_;
 };
 
 }  // namespace
