@@ -33,8 +33,10 @@ bool offsets_sound(std::span<const LspBitWord> words) {
 template <class Entry>
 bool entries_sound(const Entry* entries, uint64_t count, uint32_t limit) {
   if (limit > static_cast<Entry>(~Entry{0})) return true;
-  uint32_t wrong = 0;
-  for (uint64_t i = 0; i < count; ++i) wrong |= entries[i] >= static_cast<Entry>(limit);
+  // Gathered in the entry's own width, so that the compiler compares as many at once as a vector holds.
+  Entry wrong = 0;
+  for (uint64_t i = 0; i < count; ++i)
+    wrong = static_cast<Entry>(wrong | (entries[i] >= static_cast<Entry>(limit) ? Entry{1} : Entry{0}));
   return wrong == 0;
 }
 

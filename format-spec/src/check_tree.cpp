@@ -131,8 +131,10 @@ class TreeCheck {
     return subtree;
   }
 
+  // What runs for every slot is always inlined: a call and the copies it makes cost as much as the checks.
+
   // Checks a slot and adds it to the subtree of the node that holds it.
-  void check_slot(const Slot& at, Subtree& above) {
+  [[gnu::always_inline]] inline void check_slot(const Slot& at, Subtree& above) {
     Subtree inside;
     if (at.child == LSP_NONE) {
       if (at.line_space != LSP_NONE) inside.triangles = left_out(at);
@@ -160,7 +162,7 @@ class TreeCheck {
     return line_space_triangles(at.line_space & LSP_LINE_SPACE_MASK);
   }
 
-  Run leaf(const Slot& at) {
+  [[gnu::always_inline]] inline Run leaf(const Slot& at) {
     ++ends_;
     const uint32_t first = at.child & LSP_LEAF_FIRST_MASK;
     const uint32_t count = (at.child >> LSP_LEAF_COUNT_SHIFT & LSP_LEAF_COUNT_MASK) + 1;
@@ -178,7 +180,7 @@ class TreeCheck {
   }
 
   // A reference to a node; false where it is unsound.
-  bool link(const Slot& at) {
+  [[gnu::always_inline]] inline bool link(const Slot& at) {
     if (at.side < 0) return !nodes_.empty() && at.child == 0;
     if (at.child >= nodes_.size()) [[unlikely]]
       return unsound(RuleId::kChildOutOfRange, at, " of " + std::to_string(nodes_.size()));
@@ -191,7 +193,7 @@ class TreeCheck {
   }
 
   // Takes the subtree of a sound reference off the stack.
-  Subtree take(const Slot& at) {
+  [[gnu::always_inline]] inline Subtree take(const Slot& at) {
     if (stack_.empty() || stack_.back().node != at.child) [[unlikely]]
       if (!find_below(at)) return {};
     const Subtree subtree = stack_.back();
@@ -220,7 +222,7 @@ class TreeCheck {
   }
 
   // The boxes inside a child that is a node, against the child's own.
-  void check_nesting(const Slot& at) {
+  [[gnu::always_inline]] inline void check_nesting(const Slot& at) {
     for (int side : {0, 1}) {
       const Slot inner = slot(at.child, side);
       if (!nested(at.box, inner.box) && !inner.empty()) [[unlikely]]
@@ -238,7 +240,7 @@ class TreeCheck {
       find(RuleId::kBoxOutsideParent, at, Field::kBox, "the box reaches outside its parent's");
   }
 
-  void check_line_space(const Slot& at, const Subtree& inside, Subtree& above) {
+  [[gnu::noinline]] void check_line_space(const Slot& at, const Subtree& inside, Subtree& above) {
     const uint32_t index = at.line_space & LSP_LINE_SPACE_MASK;
     const bool terminal = (at.line_space & LSP_TERMINAL_BIT) != 0;
     if (terminal != inside.line_spaces.empty())
@@ -286,7 +288,7 @@ class TreeCheck {
     return {space.triangle_first, space.triangle_first + space.triangle_count};
   }
 
-  void append_line_spaces(Subtree& above, Run next, const Slot& at) {
+  [[gnu::always_inline]] inline void append_line_spaces(Subtree& above, Run next, const Slot& at) {
     if (!above.line_spaces.append(next)) [[unlikely]]
       find(RuleId::kLineSpaceOrder, at, Field::kLineSpace,
            "Line Space " + std::to_string(next.first) +

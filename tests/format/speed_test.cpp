@@ -1,0 +1,137 @@
+// What a check costs: at the level structure no more than four times what reading and hashing the file costs,
+// measured in one run on a file of a hundred megabytes.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+
+#include "check.h"
+#include "file.h"
+#include "hash.h"
+#include "image.h"
+
+namespace {
+
+using namespace lsp;
+using namespace lsp::corpus;
+using namespace lsp::format;
+
+// A balanced tree over 2^18 quads side by side, two triangles a leaf, and 512 sparse Line Spaces of N = 8 at
+// the same depth, each half filled: 24 MB of boxes and triangles beside 80 MB of Line Spaces' tables.
+class LargeScene {
+ public:
+  static constexpr uint32_t kLeaves = 1u << 18;
+  static constexpr uint32_t kSpaces = 512;
+
+  Image build() {
+    LspHeader& h = image_.header;
+    h.magic_0 = LSP_MAGIC_0;
+    h.magic_1 = LSP_MAGIC_1;
+    h.version_major = LSP_VERSION_MAJOR;
+    h.header_bytes = sizeof(LspHeader);
+    h.base_structure = LSP_BASE_BVH;
+    h.required_features = LSP_FEATURE_EXACT | LSP_FEATURE_LINE_SPACES;
+    h.primitive_count = 2 * kLeaves;
+    h.bounds_max = {kLeaves, 1, 1};
+    h.max_depth = h.max_stack = 18;
+    h.max_steps = 2 * kLeaves;
+    h.max_leaf_triangles = 2;
+    h.resolution = 8;
+    h.root_line_space = LSP_NONE;
+    h.root = node(0, kLeaves);
+    return std::move(image_);
+  }
+
+ private:
+  uint32_t node(uint32_t first, uint32_t count) {
+    if (count == 1) {
+      const float x = static_cast<float>(first);
+      const uint32_t triangle = static_cast<uint32_t>(image_.triangles.size());
+      image_.triangles.push_back({{x, 0, 0}, triangle, {x + 1, 0, 0}, 0, {x, 1, 0}, 0});
+      image_.triangles.push_back({{x + 1, 0, 0}, triangle + 1, {x + 1, 1, 0}, 0, {x, 1, 0}, 0});
+      return LSP_LEAF_BIT | 1u << LSP_LEAF_COUNT_SHIFT | triangle;
+    }
+    const uint32_t index = static_cast<uint32_t>(image_.nodes.size());
+    image_.nodes.push_back({});
+    const float x = static_cast<float>(first), half = static_cast<float>(count) / 2;
+    const auto [child0, space0] = child(first, count / 2);
+    const auto [child1, space1] = child(first + count / 2, count / 2);
+    image_.nodes[index] = {{x, 0, 0},        child0, {x + half, 1, 1},     space0,
+                           {x + half, 0, 0}, child1, {x + 2 * half, 1, 1}, space1};
+    return index;
+  }
+
+  std::pair<uint32_t, uint32_t> child(uint32_t first, uint32_t count) {
+    const bool carries = count == kLeaves / kSpaces;
+    const uint32_t space = static_cast<uint32_t>(image_.line_spaces.size());
+    if (carries) image_.line_spaces.push_back({});
+    const uint32_t reference = node(first, count);
+    if (!carries) return {reference, LSP_NONE};
+    fill(image_.line_spaces[space], reference, first, count);
+    return {reference, space | LSP_TERMINAL_BIT};
+  }
+
+  void fill(LspLineSpace& space, uint32_t reference, uint32_t first, uint32_t count) {
+    constexpr uint32_t kWords = 30 * 8 * 8 * 8 * 8 / 32;
+    const float lo = static_cast<float>(first) - 1, hi = static_cast<float>(first + count) + 1;
+    space = {{lo, -1, -1},
+             static_cast<uint32_t>(image_.words.size()),
+             {hi, 2, 2},
+             static_cast<uint32_t>(image_.candidates.size()),
+             {8 / (hi - lo), 8 / 3.0f, 8 / 3.0f},
+             2 * first,
+             8 | 2u << LSP_FORMAT_ENTRY_SHIFT,
+             kWords * 16,
+             2 * count,
+             reference};
+    for (uint32_t w = 0; w < kWords; ++w) image_.words.push_back({0x5A5A5A5Au, w * 16});
+    for (uint32_t w = 0; w < kWords * 8; ++w) image_.candidates.push_back(w % 512 | (w * 7 % 1024) << 16);
+  }
+
+  Image image_;
+};
+
+double seconds(const std::function<void()>& work) {
+  const auto start = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+TEST(Speed, StructureCostsNoMoreThanFourTimesReadingAndHashing) {
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "times mean nothing under the sanitizers";
+#endif
+  const auto path =
+      std::filesystem::temp_directory_path() / ("lsp-speed-" + std::to_string(getpid()) + ".lsp");
+  Bytes bytes = encode(LargeScene().build());
+  std::ofstream(path, std::ios::binary)
+      .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  ASSERT_GT(bytes.size(), size_t{100} << 20);
+  bytes = {};
+
+  // The fastest of seven, taken in turns: other work on the machine disturbs both alike.
+  double read_and_hash = 1e9, check = 1e9;
+  for (int i = 0; i < 7; ++i) {
+    read_and_hash = std::min(read_and_hash, seconds([&] {
+                               const MappedFile file(path);
+                               ASSERT_NE(hash_bytes(file.bytes()), Hash128{});
+                             }));
+    check = std::min(check, seconds([&] {
+                       const MappedFile file(path);
+                       const Report report = check_file(file.bytes());
+                       ASSERT_EQ(report.findings().size(), 0u) << to_text(report);
+                     }));
+  }
+  const uint64_t size = std::filesystem::file_size(path);
+  std::filesystem::remove(path);
+  std::printf("%.1f MB: reading and hashing %.1f ms, check %.1f ms, %.2f times\n",
+              static_cast<double>(size) * 1e-6, read_and_hash * 1e3, check * 1e3, check / read_and_hash);
+  EXPECT_LE(check, 4 * read_and_hash);
+}
+
+}  // namespace
