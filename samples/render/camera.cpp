@@ -63,7 +63,8 @@ std::string to_string(const Camera& c) {
   return text;
 }
 
-Camera default_camera(const RenderScene& scene, RayTracer& tracer) {
+Camera default_camera(const RenderScene& scene, RayTracer& tracer, Lamp& lamp) {
+  lamp = {};
   const glm::vec3 size = scene.hi() - scene.lo();
   const glm::vec3 centre = 0.5f * (scene.lo() + scene.hi());
   const float diagonal = scene.diagonal();
@@ -103,6 +104,11 @@ Camera default_camera(const RenderScene& scene, RayTracer& tracer) {
     camera.eye = inside + around[back] * 0.8f * std::min(free[back], diagonal);
     camera.target = inside - around[back] * 0.1f * diagonal;
     camera.fov_degrees = 65.0f;
+    float reach = 0.0f;
+    for (const float distance : free)
+      reach += std::min(distance, 0.3f * diagonal) / static_cast<float>(free.size());
+    // Bright enough for surfaces as far away as the walls are on average.
+    lamp = {inside, 0.01f * diagonal, 3.0f * reach * reach};
     return camera;
   }
   Camera camera;

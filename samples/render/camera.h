@@ -24,6 +24,13 @@ std::string to_string(const Camera& camera);
 
 // Inside a hall it stands where it sees far, at three tenths of the height; otherwise it looks at the whole
 // from the front, right and above. y is up.
-Camera default_camera(const RenderScene& scene, RayTracer& tracer);
+//
+// Where it is a hall, `lamp` is set to a light in its middle; the radius is 0 otherwise.
+struct Lamp {
+  glm::vec3 position{0.0f};
+  float radius = 0.0f;
+  float intensity = 0.0f;  // radiant
+};
+Camera default_camera(const RenderScene& scene, RayTracer& tracer, Lamp& lamp);
 
 }  // namespace lsp::sample

@@ -76,7 +76,7 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
       throw Failure(Exit::kUsage, output, "pictures are written as .png or .pfm; choose one of the two");
     }
   }
-  const Sky sky = parse_sun(arguments.sun);
+  Sky sky = parse_sun(arguments.sun);
   Camera camera = arguments.camera.empty() ? Camera{} : parse_camera(arguments.camera);
 
   // Without this oneTBB would never use more threads than there are cores.
@@ -88,11 +88,31 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
   if (!common.quiet) {
     for (const std::string& note : scene.notes())
       std::cerr << program << ": " << arguments.file << ": " << note << "\n";
+    if (options.approximate && (scene.view().header->required_features & LSP_FEATURE_LINE_SPACES) == 0) {
+      std::cerr << program << ": " << arguments.file
+                << ": no Line Spaces in the file: approximate rays are exact\n";
+    }
   }
   const uint32_t uses = LSP_USE_EXACT | (options.approximate ? LSP_USE_APPROXIMATE : 0u);
   const auto tracer = arguments.backend == "vulkan" ? make_vulkan_tracer(scene, uses)
                                                     : make_cpu_tracer(scene, options.threads);
-  if (arguments.camera.empty()) camera = default_camera(scene, *tracer);
+  if (arguments.camera.empty()) {
+    Lamp lamp;
+    camera = default_camera(scene, *tracer, lamp);
+    if (lamp.radius == 0) {
+      // Out in the open nothing takes light away, as walls do: the same sky would be glaring.
+      sky.brightness *= 0.4f;
+      sky.sun_irradiance *= 0.4f;
+    } else if (!scene.has_emitters()) {
+      sky.lamp_position = lamp.position;
+      sky.lamp_radius = lamp.radius;
+      sky.lamp_intensity = glm::vec3(1.0f, 0.9f, 0.75f) * lamp.intensity;
+      if (!common.quiet) {
+        std::cerr << program << ": " << arguments.file
+                  << ": a hall without lights: a lamp hangs in its middle\n";
+      }
+    }
+  }
 
   const bool show_progress = !common.quiet && isatty(STDERR_FILENO) != 0;
   RenderReport report;

@@ -71,12 +71,16 @@ class RenderScene {
   std::vector<std::string> notes_;
 };
 
-// The light from outside: a clear sky with a sun in it. y is up.
+// The light that is no part of the scene: a clear sky with a sun in it, and perhaps a lamp. y is up.
 struct Sky {
   glm::vec3 sun_direction = glm::normalize(glm::vec3(-0.28f, 0.80f, 0.53f));
   glm::vec3 sun_irradiance = glm::vec3(1.0f, 0.87f, 0.70f) * 9.0f;
   float sun_radius_rad = 0.012f;
   float brightness = 1.0f;
+  // A small ball that shines evenly, for halls without light of their own. Radiant intensity; black: none.
+  glm::vec3 lamp_position = glm::vec3(0.0f);
+  float lamp_radius = 0.0f;
+  glm::vec3 lamp_intensity = glm::vec3(0.0f);
   // Radiance of the sky without the sun's disc.
   glm::vec3 radiance(glm::vec3 direction) const;
 };

@@ -24,6 +24,9 @@ constexpr size_t kWavePixels = size_t{1} << 17;
 // picture shows.
 constexpr float kLargestSample = 20.0f;
 
+// The light rays of a point.
+enum LightSlot : size_t { kSkyLight, kSun, kEmitter, kLamp, kLightSlots };
+
 // What a picture is the sum of, kept apart for the denoiser.
 enum Component : uint32_t {
   kSharp,     // little noise or fine detail: background, emission, sun
@@ -40,7 +43,7 @@ enum Dimension : uint32_t {
   kPixelPoint,
   kGlossyDirection,
   kOcclusionDirection,
-  kDirectFirst,  // three: see add_light_rays
+  kDirectFirst,  // three: see make_light_rays
   kDiffuseDirection = kDirectFirst + 4,
   kPathLightFirst,  // three of the diffuse path, then three of the glossy one
   kDimensionsPerBounce = 12,
@@ -414,12 +417,12 @@ class Renderer {
     });
   }
 
-  // ---- light rays: up to three slots a point, then packed together
+  // ---- light rays: a few slots a point, then packed together
   // ------------------------------------------
 
   void begin_light(size_t points) {
-    slots_.resize(3 * points);
-    slot_rays_.resize(3 * points);
+    slots_.resize(kLightSlots * points);
+    slot_rays_.resize(kLightSlots * points);
   }
 
   void end_light() {
@@ -432,17 +435,20 @@ class Renderer {
     }
   }
 
-  // Fills the three slots of point `index`: a ray to the sky, one to the sun, one to an emitter; a slot whose
-  // light is black makes no ray. `weight`: what the point passes on of arriving light, albedo included.
+  // Fills the slots of point `index`: a ray to the sky, one to the sun, to an emitter, to the lamp; a slot
+  // whose light is black makes no ray. `weight`: what the point passes on of arriving light, albedo included.
   void make_light_rays(size_t index, uint32_t item, const SurfacePoint& p, glm::vec3 weight,
                        uint32_t dimension, Component component, Component sun_component) {
-    LightRay* slot = &slots_[3 * index];
-    LspRay* ray = &slot_rays_[3 * index];
-    for (int i = 0; i < 3; ++i) slot[i] = {item, i == 1 ? sun_component : component, glm::vec3(0.0f)};
+    LightRay* slot = &slots_[kLightSlots * index];
+    LspRay* ray = &slot_rays_[kLightSlots * index];
+    for (size_t i = 0; i < kLightSlots; ++i) {
+      const bool small = i == kSun || i == kLamp;
+      slot[i] = {item, small ? sun_component : component, glm::vec3(0.0f)};
+    }
 
     const glm::vec3 toward_sky = above(p, cosine_direction(p.shading_normal, random(item, dimension)));
-    slot[0].radiance = weight * sky_.radiance(toward_sky);
-    ray[0] = ray_from(p, toward_sky, kInfinity);
+    slot[kSkyLight].radiance = weight * sky_.radiance(toward_sky);
+    ray[kSkyLight] = ray_from(p, toward_sky, kInfinity);
 
     glm::vec3 t;
     glm::vec3 b;
@@ -453,11 +459,30 @@ class Renderer {
                                                 r * std::sin(2.0f * kPi * disc.y) * b);
     const float sun_cosine = glm::dot(toward_sun, p.shading_normal);
     if (sun_cosine > 0 && glm::dot(toward_sun, p.geometric_normal) > 0) {
-      slot[1].radiance = weight * sky_.sun_irradiance * (sun_cosine / kPi);
-      ray[1] = ray_from(p, toward_sun, kInfinity);
+      slot[kSun].radiance = weight * sky_.sun_irradiance * (sun_cosine / kPi);
+      ray[kSun] = ray_from(p, toward_sun, kInfinity);
     }
 
-    if (scene_.has_emitters()) make_emitter_ray(slot[2], ray[2], p, weight, dimension + 2);
+    if (sky_.lamp_intensity != glm::vec3(0.0f))
+      make_lamp_ray(slot[kLamp], ray[kLamp], p, weight, dimension + 2);
+    if (scene_.has_emitters()) make_emitter_ray(slot[kEmitter], ray[kEmitter], p, weight, dimension + 2);
+  }
+
+  // A ray to a point in the lamp's ball.
+  void make_lamp_ray(LightRay& slot, LspRay& ray, const SurfacePoint& p, glm::vec3 weight,
+                     uint32_t dimension) const {
+    const glm::vec2 u = random(slot.item, dimension + 0x30000u);
+    const float z = 1.0f - 2.0f * u.x;
+    const float r = std::sqrt(std::max(1.0f - z * z, 0.0f));
+    const glm::vec3 on_ball(r * std::cos(2.0f * kPi * u.y), z, r * std::sin(2.0f * kPi * u.y));
+    const glm::vec3 origin = p.position + offset_ * p.geometric_normal;
+    const glm::vec3 way = sky_.lamp_position + sky_.lamp_radius * on_ball - origin;
+    const float distance2 = glm::dot(way, way);
+    if (!(distance2 > 0)) return;
+    const float cosine = glm::dot(way, p.shading_normal) / std::sqrt(distance2);
+    if (cosine <= 0 || glm::dot(way, p.geometric_normal) <= 0) return;
+    slot.radiance = weight * sky_.lamp_intensity * (cosine / (distance2 * kPi));
+    ray = {from_glm(origin), 0.0f, from_glm(way), 1.0f};
   }
 
   // A ray to one of a few candidate points on emitters, chosen by the light it would bring if nothing were in

@@ -145,11 +145,19 @@ TEST_F(Programs, ExitCodes) {
   EXPECT_EQ(run("lsp-render " + file("missing.lsp") + " -o " + file("x.png") + quiet), 2);
   EXPECT_EQ(run("lsp-render " + scene + " -o /nonexistent/x.png --size 8x8 --samples 1" + quiet), 2);
   EXPECT_EQ(run("lsp-render " + file("plane.glb") + " -o " + file("x.png") + quiet), 3);
-  EXPECT_EQ(run("lsp-bake " + file("plane.glb") + " -o " + file("plain.lsp") + " --quiet --no-line-spaces"),
+  ASSERT_EQ(run("lsp-bake " + file("spheres.glb") + " -o " + file("lean.lsp") +
+                " --quiet --resolution 4 --depth 6 --no-exact"),
             0);
-  EXPECT_EQ(run("lsp-render " + file("plain.lsp") + " -o " + file("x.png") + " --mode approximate" + quiet),
-            5);
+  EXPECT_EQ(run("lsp-render " + file("lean.lsp") + " -o " + file("x.png") + quiet), 5);
   EXPECT_FALSE(std::filesystem::exists(file("x.png")));
+}
+
+TEST_F(Programs, WithoutLineSpacesApproximateIsExact) {
+  ASSERT_EQ(run("lsp-bake " + file("spheres.glb") + " -o " + file("plain.lsp") + " --quiet --no-line-spaces"),
+            0);
+  render("plain", "exact", "--mode exact");
+  render("plain", "approximate", "--mode approximate");
+  EXPECT_EQ(read(file("exact.pfm")), read(file("approximate.pfm")));
 }
 
 TEST_F(Programs, PackedFilesRenderTheSame) {
