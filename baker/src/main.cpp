@@ -1,12 +1,12 @@
 // lsp-bake: turns meshes into an .lsp file.
 #include <fcntl.h>
-#include <sys/resource.h>
 #include <tbb/global_control.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cinttypes>
+#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -68,6 +68,15 @@ std::string megabytes(uint64_t bytes) {
   char text[32];
   std::snprintf(text, sizeof text, "%.2f MB", double(bytes) / 1e6);
   return text;
+}
+
+// The most memory this process has held; 0 where the system does not tell. getrusage would count what the
+// process that started this one held.
+uint64_t peak_memory_bytes() {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);)
+    if (line.starts_with("VmHWM:")) return std::stoull(line.substr(6)) * 1024;
+  return 0;
 }
 
 // Null where nothing could be measured.
@@ -206,9 +215,7 @@ Exit run(Arguments a) {
   const double write_seconds = timer();
   bar.clear();
 
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  const uint64_t peak = uint64_t(usage.ru_maxrss) * 1024;
+  const uint64_t peak = peak_memory_bytes();
   const LineSpaces& ls = baked.line_spaces;
   if (a.common.json) {
     Json sections = Json::array();

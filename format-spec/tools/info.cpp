@@ -6,7 +6,7 @@
 
 #include "annotate.h"
 #include "file.h"
-#include "program_frame.h"
+#include "lsp/command_line.h"
 #include "summary.h"
 
 namespace {
@@ -78,6 +78,6 @@ int main(int argc, char** argv) {
   app.add_option("--memory-limit", arguments.memory_limit,
                  "For the sections of a packed file, as in 512MB or 8GB")
       ->transform(CLI::AsSizeValue(false));
-  add_common_options(app, common);
-  return run_program(app, argc, argv, [&] { return show(arguments, common); });
+  add_common_options(app, "lsp-info", common);
+  return run_program("lsp-info", app, argc, argv, [&] { return show(arguments, common); });
 }

@@ -6,7 +6,7 @@
 
 #include "check.h"
 #include "file.h"
-#include "program_frame.h"
+#include "lsp/command_line.h"
 #include "source.h"
 
 namespace {
@@ -101,6 +101,6 @@ int main(int argc, char** argv) {
   app.add_option("--examples", arguments.examples, "How many findings of a rule are printed")
       ->capture_default_str();
   app.add_flag("--rules", arguments.rules, "Print the rule catalogue as Markdown and end");
-  add_common_options(app, common);
-  return run_program(app, argc, argv, [&] { return validate(arguments, common); });
+  add_common_options(app, "lsp-validate", common);
+  return run_program("lsp-validate", app, argc, argv, [&] { return validate(arguments, common); });
 }

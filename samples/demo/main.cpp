@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "../command_line.h"
 #include "../output_file.h"
+#include "lsp/command_line.h"
 #include "page.h"
 
 namespace lsp::sample {

@@ -2,8 +2,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "../command_line.h"
 #include "compare.h"
+#include "lsp/command_line.h"
 
 int main(int argc, char** argv) {
   using namespace lsp;

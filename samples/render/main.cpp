@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "../command_line.h"
+#include "lsp/command_line.h"
 #include "lsp/lsp_vulkan.h"
 #include "renderer.h"
 

@@ -2,8 +2,8 @@
 #include <chrono>
 #include <nlohmann/json.hpp>
 
-#include "../command_line.h"
 #include "../output_file.h"
+#include "lsp/command_line.h"
 #include "scene.h"
 
 int main(int argc, char** argv) {

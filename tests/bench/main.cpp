@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "command_line.h"
 #include "context.h"
+#include "lsp/command_line.h"
 #include "machine.h"
 
 namespace lsp::bench {
@@ -28,7 +28,7 @@ constexpr Suite kSuites[] = {{"pareto", pareto_suite},   {"peers", peers_suite},
                              {"paper", paper_suite},     {"pictures", pictures_suite},
                              {"scaling", scaling_suite}, {"stress", stress_suite}};
 
-void run(const Arguments& arguments, const sample::CommonOptions& common) {
+void run(const Arguments& arguments, const CommonOptions& common) {
   namespace fs = std::filesystem;
   Context context;
   context.quick = arguments.quick;
@@ -91,9 +91,9 @@ void run(const Arguments& arguments, const sample::CommonOptions& common) {
 int main(int argc, char** argv) {
   using namespace lsp;
   bench::Arguments arguments;
-  sample::CommonOptions common;
+  CommonOptions common;
   CLI::App app("Measures run time against error and writes JSON, CSV, pictures and one HTML page.");
-  sample::add_common_options(app, "lsp-bench", common);
+  add_common_options(app, "lsp-bench", common);
   app.add_option("SCENE", arguments.scenes,
                  "Mesh files, baked in several ways, or .lsp files, measured as they are")
       ->required();
@@ -106,5 +106,5 @@ int main(int argc, char** argv) {
   app.add_flag("--no-vulkan", arguments.no_vulkan, "Measure the CPU only");
   app.add_option("--threads", arguments.threads, "What 'all threads' means (default: all)")
       ->check(CLI::Range(1, 1024));
-  return sample::run_program("lsp-bench", app, argc, argv, [&] { bench::run(arguments, common); });
+  return run_program("lsp-bench", app, argc, argv, [&] { bench::run(arguments, common); });
 }

@@ -6,12 +6,12 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <functional>
 #include <iostream>
 #include <mutex>
 #include <new>
 #include <string>
 #include <string_view>
+#include <type_traits>
 
 #include "lsp/layout.h"
 #include "lsp/program.h"
@@ -32,15 +32,21 @@ inline void add_common_options(CLI::App& app, const char* program, CommonOptions
   app.add_flag("--json", options.json, "Print one JSON object on standard output");
 }
 
-// Parses, runs `body` and returns its exit code; turns what is thrown into a message on standard error.
-inline int run_program(const char* program, CLI::App& app, int argc, char** argv,
-                       const std::function<Exit()>& body) {
+// Parses, runs `body` and returns its exit code: that of the Exit or int it returns, 0 if it returns nothing.
+// Turns what is thrown into a message on standard error.
+template <typename Body>
+int run_program(const char* program, CLI::App& app, int argc, char** argv, Body&& body) {
   try {
     app.parse(argc, argv);
-    const Exit exit = body();
+    int exit = 0;
+    if constexpr (std::is_void_v<decltype(body())>)
+      body();
+    else
+      exit = static_cast<int>(body());
     std::cout.flush();
-    if (!std::cout) throw Failure(Exit::kFile, "standard output", "cannot write, is the disk full?");
-    return static_cast<int>(exit);
+    if (!std::cout || std::fflush(stdout) != 0)
+      throw Failure(Exit::kFile, "standard output", "cannot be written, make room");
+    return exit;
   } catch (const CLI::Success& e) {  // --help, --version
     app.exit(e);
     return static_cast<int>(Exit::kDone);
