@@ -2,18 +2,17 @@
 # Installs the Debian packages of packages.txt that are missing; does nothing, and needs no network, when all are
 # there.
 #
-#   ./samples/setup.sh [--list]
+#   ./samples/setup.sh [--list] [PACKAGE...]
 #
-# --list only prints what is missing. Runs apt-get as root, or with sudo.
+# --list only prints what is missing. PACKAGEs are wanted as well. Runs apt-get as root, or with sudo.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 
 list_only=0
 case "${1:-}" in
-  --list) list_only=1 ;;
+  --list) list_only=1; shift ;;
   --help) sed -n '2,7s/^# \{0,1\}//p' "$0"; exit 0 ;;
-  '') ;;
-  *) echo "setup.sh: unknown option $1, see --help" >&2; exit 1 ;;
+  -*) echo "setup.sh: unknown option $1, see --help" >&2; exit 1 ;;
 esac
 
 if ! command -v dpkg-query >/dev/null; then
@@ -26,7 +25,7 @@ while IFS= read -r package; do
   case "$package" in '' | '#'*) continue ;; esac
   state=$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null || true)
   [ "$state" = installed ] || missing+=("$package")
-done <"$here/packages.txt"
+done < <(cat "$here/packages.txt"; printf '%s\n' "$@")
 
 if [ ${#missing[@]} -eq 0 ]; then exit 0; fi
 if [ "$list_only" = 1 ]; then printf '%s\n' "${missing[@]}"; exit 0; fi

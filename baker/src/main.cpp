@@ -204,7 +204,11 @@ Exit run(Arguments a) {
     baked = bake_with(a);
     if (measure) error = measure_error(baked, kErrorRays);
   }
-  if (a.no_exact) keep_approximate_only(baked);
+  if (a.no_exact && baked.line_spaces.records.empty())
+    baked.skipped.push_back(
+        "leaving out the exact tree: the scene is too small for Line Spaces at this depth");
+  else if (a.no_exact)
+    keep_approximate_only(baked);
   baked.header.source_hash_lo = source[0];
   baked.header.source_hash_hi = source[1];
   timer();
