@@ -101,7 +101,7 @@ Camera default_camera(const RenderScene& scene, RayTracer& tracer, Lamp& lamp) {
     }
     const size_t back = free[best] > free[(best + 32) % 64] ? (best + 32) % 64 : best;
     Camera camera;
-    camera.eye = inside + around[back] * 0.8f * std::min(free[back], diagonal);
+    camera.eye = inside + around[back] * 0.6f * std::min(free[back], diagonal);
     camera.target = inside - around[back] * 0.1f * diagonal;
     camera.fov_degrees = 65.0f;
     float reach = 0.0f;
