@@ -60,7 +60,7 @@ echo "valid, $seconds s"
 
 render() { # render NAME MODE BACKEND
   "$bin/lsp-render" "$out/scene.lsp" -o "$out/$1.png" -o "$out/$1.pfm" --mode "$2" --backend "$3" \
-    --size 640x360 --samples 4 --denoise "${view[@]}" --json >"$out/$1.json"
+    --size 576x324 --samples 4 --denoise "${view[@]}" --json >"$out/$1.json"
 }
 
 say "rendering indirect light, exact and approximate"
