@@ -32,7 +32,11 @@ inline const T& at(const T* array, uint index, uint count) {
 
 }  // namespace lsp::subset
 
+#ifdef __SANITIZE_ADDRESS__
+#define LSP_FN [[maybe_unused]] static  // inlined and instrumented, sixteen loops take minutes to compile
+#else
 #define LSP_FN static inline __attribute__((always_inline))
+#endif
 #define LSP_IN(T) const T&
 #define LSP_OUT(T) T&
 #define LSP_INOUT(T) T&
