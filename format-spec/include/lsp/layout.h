@@ -66,6 +66,9 @@ typedef struct lsp_float3 {
 #define LSP_SECTION_LSPC 0x4350534Cu /* "LSPC": LspLineSpace */
 #define LSP_SECTION_BITS 0x53544942u /* "BITS": LspBitWord */
 #define LSP_SECTION_CAND 0x444E4143u /* "CAND": candidate entries, packed into 32-bit words */
+#define LSP_SECTION_GRID 0x44495247u /* "GRID": LspBitWord, which cells of an NTree node hold something */
+#define LSP_SECTION_CELL 0x4C4C4543u /* "CELL": LspCell */
+#define LSP_SECTION_REFS 0x53464552u /* "REFS": uint, indices of LspTriangle, of an NTree's leaves */
 #define LSP_SECTION_META 0x4154454Du /* "META": provenance, UTF-8 JSON */
 
 /* LspSection.flags */
@@ -135,17 +138,22 @@ LSP_BEGIN(LspHeader)
   LSP_UINT material_count;
   LSP_UINT max_depth;          /* edges from the root to the deepest leaf */
   LSP_UINT max_stack;          /* entries a traversal needs at most; <= LSP_MAX_STACK */
-  LSP_UINT max_steps;          /* nodes and leaves a traversal visits at most */
-  LSP_UINT max_leaf_triangles; /* <= LSP_MAX_LEAF_TRIANGLES */
+  LSP_UINT max_steps;          /* nodes and leaves a traversal visits at most; NTree: cells and references */
+  LSP_UINT max_leaf_triangles; /* BVH: <= LSP_MAX_LEAF_TRIANGLES */
   LSP_UINT resolution;         /* N of the bake, for information; each Line Space states its own */
   LSP_UINT line_space_depth;   /* D of the bake, for information */
   LSP_UINT line_space_triangles; /* T of the bake, for information */
-  LSP_UINT ntree_branching;      /* N of the NTree, 0 for a BVH */
-  LSP_UINT ntree_depth;          /* levels of the NTree, 0 for a BVH */
+  LSP_UINT ntree_branching;      /* N of the NTree, 2 to LSP_MAX_BRANCHING, 0 for a BVH */
+  LSP_UINT ntree_depth;          /* levels of the NTree, 1 to LSP_MAX_NTREE_DEPTH, 0 for a BVH */
   LSP_UINT reserved_0;           /* zero */
   LSP_U64 source_hash_lo;        /* XXH3-128 of the input files, in order */
   LSP_U64 source_hash_hi;
-  LSP_UINT reserved[10]; /* zero */
+  LSP_UINT cell_count;      /* LspCell; this and what follows is zero for a BVH */
+  LSP_UINT reference_count; /* of REFS */
+  LSP_VEC3 ntree_lo;        /* lower corner of the root's cube */
+  LSP_FLOAT ntree_size;     /* its edge */
+  LSP_FLOAT ntree_margin;   /* a cell also holds what comes within this distance of it */
+  LSP_UINT reserved[3];     /* zero */
 LSP_END(LspHeader)
 
 LSP_BEGIN(LspSection)
@@ -172,6 +180,24 @@ LSP_BEGIN(LspNode)
   LSP_VEC3 hi1;
   LSP_UINT line_space1;
 LSP_END(LspNode)
+
+/* A cell of an NTree node, the base structure in which a node is a cube cut into N^3 equal cubes (paper, section
+ * 3.2). Nodes are numbered depth first, the root is 0; each has LSP_GRID_WORDS(N) words of GRID, in which bit
+ * LSP_CELL_INDEX(x, y, z, N) is set when the cell holds something. The record of a filled cell is
+ * offset + bitcount(bits below it) of its word: offsets count from the beginning of CELL. The cell with global
+ * coordinate g on an axis, at level l (the root's cells: 1), begins at ntree_lo + g * (ntree_size / N^l). Cells
+ * are in the order of their nodes and bits; so are the references of leaves, and the Line Spaces that cells carry
+ * (the root's own comes first). */
+LSP_BEGIN(LspCell)
+  LSP_UINT child; /* a node; with LSP_LEAF_BIT the first of `count` references; LSP_NONE: nothing but Line Space */
+  LSP_UINT count; /* references of a leaf, else 0 */
+  LSP_UINT line_space; /* Line Space reference */
+LSP_END(LspCell)
+
+#define LSP_MAX_BRANCHING 16u
+#define LSP_MAX_NTREE_DEPTH 4u
+#define LSP_GRID_WORDS(n) (((n) * (n) * (n) + 31u) / 32u)
+#define LSP_CELL_INDEX(x, y, z, n) ((x) + (n) * ((y) + (n) * (z)))
 
 LSP_BEGIN(LspTriangle)
   LSP_VEC3 v0;
@@ -265,6 +291,7 @@ LSP_END(LspHit)
 LSP_STATIC_ASSERT(sizeof(LspHeader) == 256);
 LSP_STATIC_ASSERT(sizeof(LspSection) == 64);
 LSP_STATIC_ASSERT(sizeof(LspNode) == 64);
+LSP_STATIC_ASSERT(sizeof(LspCell) == 12);
 LSP_STATIC_ASSERT(sizeof(LspTriangle) == 48);
 LSP_STATIC_ASSERT(sizeof(LspCornerNormals) == 12);
 LSP_STATIC_ASSERT(sizeof(LspMaterial) == 48);
