@@ -120,10 +120,20 @@ types:
         type: u4
       - id: source_hash
         size: 16
+      - id: cell_count
+        type: u4
+      - id: reference_count
+        type: u4
+      - id: ntree_lo
+        type: vec3
+      - id: ntree_size
+        type: f4
+      - id: ntree_margin
+        type: f4
       - id: reserved
         type: u4
         repeat: expr
-        repeat-expr: 10
+        repeat-expr: 3
   section:
     seq:
       - id: type

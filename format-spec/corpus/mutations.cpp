@@ -84,7 +84,8 @@ void header(Collector& c) {
            [](LspHeader& h) { h.section_table_offset = ~uint64_t{63}; });
   c.header(RuleId::kTableOutside, "section_count is 2^32 - 1",
            [](LspHeader& h) { h.section_count = 0xFFFFFFFFu; });
-  c.raw(RuleId::kTruncated, "the last 256 bytes are missing", [](Bytes& b) { b.erase(b.end() - 256, b.end()); });
+  c.raw(RuleId::kTruncated, "the last 256 bytes are missing",
+        [](Bytes& b) { b.erase(b.end() - 256, b.end()); });
   c.raw(RuleId::kExtraBytes, "256 zero bytes follow", [](Bytes& b) { b.resize(b.size() + 256); });
   c.header(RuleId::kAlignment, "alignment is 512", [](LspHeader& h) { h.alignment = 512; });
   c.bytes(RuleId::kFileNotPadded, "the padding at the end is 16 bytes short", [](Bytes& b) {
@@ -92,7 +93,7 @@ void header(Collector& c) {
     header_of(b).file_bytes -= 16;
   });
   c.header(RuleId::kBaseStructure, "base_structure is 3", [](LspHeader& h) { h.base_structure = 3; });
-  c.header(RuleId::kReservedNotZero, "reserved[9] is 1", [](LspHeader& h) { h.reserved[9] = 1; });
+  c.header(RuleId::kReservedNotZero, "reserved[2] is 1", [](LspHeader& h) { h.reserved[2] = 1; });
   c.header(RuleId::kBoundsNotFinite, "bounds_max.x is infinite",
            [](LspHeader& h) { h.bounds_max.x = kInfinity; });
   c.header(RuleId::kTolerances, "normal_angle_cos is NaN",

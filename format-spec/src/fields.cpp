@@ -72,6 +72,11 @@ struct Fields<LspHeader> {
                                    LSP_FIELD(reserved_0),
                                    LSP_FIELD(source_hash_lo),
                                    LSP_FIELD(source_hash_hi),
+                                   LSP_FIELD(cell_count),
+                                   LSP_FIELD(reference_count),
+                                   LSP_FIELD(ntree_lo),
+                                   LSP_FIELD(ntree_size),
+                                   LSP_FIELD(ntree_margin),
                                    LSP_FIELD(reserved)};
 };
 
@@ -89,6 +94,12 @@ struct Fields<LspNode> {
   using Owner = LspNode;
   static constexpr Field list[] = {LSP_FIELD(lo0), LSP_FIELD(child0), LSP_FIELD(hi0), LSP_FIELD(line_space0),
                                    LSP_FIELD(lo1), LSP_FIELD(child1), LSP_FIELD(hi1), LSP_FIELD(line_space1)};
+};
+
+template <>
+struct Fields<LspCell> {
+  using Owner = LspCell;
+  static constexpr Field list[] = {LSP_FIELD(child), LSP_FIELD(count), LSP_FIELD(line_space)};
 };
 
 template <>
@@ -159,20 +170,16 @@ constexpr bool complete() {
   }
   return at == sizeof(T);
 }
-static_assert(complete<LspHeader>() && complete<LspSection>() && complete<LspNode>() &&
+static_assert(complete<LspHeader>() && complete<LspSection>() && complete<LspNode>() && complete<LspCell>() &&
               complete<LspTriangle>() && complete<LspCornerNormals>() && complete<LspMaterial>() &&
               complete<LspLineSpace>() && complete<LspBitWord>() && complete<LspRay>() && complete<LspHit>());
 
 constexpr Struct kStructs[] = {
-    describe<LspHeader>("LspHeader"),
-    describe<LspSection>("LspSection"),
-    describe<LspNode>("LspNode"),
-    describe<LspTriangle>("LspTriangle"),
-    describe<LspCornerNormals>("LspCornerNormals"),
-    describe<LspMaterial>("LspMaterial"),
-    describe<LspLineSpace>("LspLineSpace"),
-    describe<LspBitWord>("LspBitWord"),
-    describe<LspRay>("LspRay"),
+    describe<LspHeader>("LspHeader"),     describe<LspSection>("LspSection"),
+    describe<LspNode>("LspNode"),         describe<LspCell>("LspCell"),
+    describe<LspTriangle>("LspTriangle"), describe<LspCornerNormals>("LspCornerNormals"),
+    describe<LspMaterial>("LspMaterial"), describe<LspLineSpace>("LspLineSpace"),
+    describe<LspBitWord>("LspBitWord"),   describe<LspRay>("LspRay"),
     describe<LspHit>("LspHit"),
 };
 

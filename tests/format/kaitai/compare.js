@@ -19,7 +19,7 @@ async function compile(path) {
 }
 
 const wide = new Set(['file_bytes', 'section_table_offset', 'primitive_count', 'offset', 'stored_bytes', 'bytes', 'element_count']);
-const floats = new Set(['normal_angle_cos', 'plane_tolerance', 'opacity', 'roughness', 'metallic', 'x', 'y', 'z']);
+const floats = new Set(['normal_angle_cos', 'plane_tolerance', 'ntree_size', 'ntree_margin', 'opacity', 'roughness', 'metallic', 'x', 'y', 'z']);
 
 // headerBytes becomes header_bytes; the compiler drops the underscore of reserved_0.
 const snake = (name) => (name === 'reserved0' ? 'reserved_0' : name.replace(/([A-Z])/g, '_$1').toLowerCase());
