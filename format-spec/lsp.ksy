@@ -6,7 +6,8 @@ meta:
   license: MIT
 doc: |
   A scene of triangles, a tree over them, and Line Spaces: tables that answer what a ray through a box hits.
-  The normative text is SPEC.md; this description reads raw sections and leaves packed ones as bytes.
+  The normative text is SPEC.md. A packed section is one zstd frame, for which Kaitai Struct has no process of its
+  own: zstd_frame(bytes) stands for a decompressor that returns so many bytes.
 seq:
   - id: header
     type: header
@@ -23,6 +24,9 @@ enums:
     0x4350534c: lspc
     0x53544942: bits
     0x444e4143: cand
+    0x44495247: grid
+    0x4c4c4543: cell
+    0x53464552: refs
     0x4154454d: meta
   codec:
     0: none
@@ -168,7 +172,7 @@ types:
         pos: offset
         size: stored_bytes
         if: codec == codec::none
-        type:
+        type: &content
           switch-on: type
           cases:
             'section_type::node': nodes
@@ -177,9 +181,20 @@ types:
             'section_type::matl': materials
             'section_type::lspc': line_spaces
             'section_type::bits': bit_words
-            'section_type::cand': candidates
+            'section_type::cand': words
+            'section_type::grid': bit_words
+            'section_type::cell': cells
+            'section_type::refs': words
             'section_type::meta': provenance
+      unpacked_body:
+        io: _root._io
+        pos: offset
+        size: stored_bytes
+        process: zstd_frame(bytes)
+        if: codec == codec::zstd
+        type: *content
   child_reference:
+    doc: Of a BVH. An NTree's Line Spaces repeat the value of a cell_reference in this place.
     seq:
       - id: value
         type: u4
@@ -196,6 +211,22 @@ types:
         if: is_leaf
       triangle_count:
         value: ((value >> 27) & 15) + 1
+        if: is_leaf
+  cell_reference:
+    doc: Of a cell of an NTree. The number of a leaf's references stands beside it.
+    seq:
+      - id: value
+        type: u4
+    instances:
+      is_none:
+        value: value == 0xffffffff
+      is_leaf:
+        value: value >= 0x80000000 and value != 0xffffffff
+      node:
+        value: value
+        if: value < 0x80000000
+      first_reference:
+        value: value & 0x7fffffff
         if: is_leaf
   line_space_reference:
     seq:
@@ -231,6 +262,19 @@ types:
       - id: hi1
         type: vec3
       - id: line_space1
+        type: line_space_reference
+  cells:
+    seq:
+      - id: elements
+        type: cell
+        repeat: eos
+  cell:
+    seq:
+      - id: child
+        type: cell_reference
+      - id: count
+        type: u4
+      - id: line_space
         type: line_space_reference
   triangles:
     seq:
@@ -346,7 +390,8 @@ types:
         type: u4
       - id: offset
         type: u4
-  candidates:
+  words:
+    doc: Candidate entries of 1, 2 or 4 bytes, packed; or indices of triangles.
     seq:
       - id: words
         type: u4

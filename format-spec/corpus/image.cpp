@@ -40,6 +40,10 @@ Sections to_sections(const Image& image) {
   LspHeader& header = result.header;
   header.alignment = image.alignment;
   header.node_count = static_cast<uint32_t>(image.nodes.size());
+  if (header.base_structure == LSP_BASE_NTREE)
+    header.node_count = static_cast<uint32_t>(image.grid.size() / LSP_GRID_WORDS(header.ntree_branching));
+  header.cell_count = static_cast<uint32_t>(image.cells.size());
+  header.reference_count = static_cast<uint32_t>(image.references.size());
   header.triangle_count = static_cast<uint32_t>(image.triangles.size());
   header.material_count = static_cast<uint32_t>(image.materials.size());
   header.line_space_count = static_cast<uint32_t>(image.line_spaces.size());
@@ -57,6 +61,9 @@ Sections to_sections(const Image& image) {
   add(LSP_SECTION_LSPC, kRequired, sizeof(LspLineSpace), as_bytes_of(image.line_spaces));
   add(LSP_SECTION_BITS, kRequired, sizeof(LspBitWord), as_bytes_of(image.words));
   add(LSP_SECTION_CAND, kRequired, sizeof(uint32_t), as_bytes_of(image.candidates));
+  add(LSP_SECTION_GRID, kRequired, sizeof(LspBitWord), as_bytes_of(image.grid));
+  add(LSP_SECTION_CELL, kRequired, sizeof(LspCell), as_bytes_of(image.cells));
+  add(LSP_SECTION_REFS, kRequired, sizeof(uint32_t), as_bytes_of(image.references));
   add(LSP_SECTION_META, 0, 1, std::as_bytes(std::span(image.meta)));
   return result;
 }

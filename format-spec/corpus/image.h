@@ -26,6 +26,9 @@ struct Image {
   std::vector<LspLineSpace> line_spaces;
   std::vector<LspBitWord> words;
   std::vector<uint32_t> candidates;
+  std::vector<LspBitWord> grid;  // of an NTree, in place of nodes
+  std::vector<LspCell> cells;
+  std::vector<uint32_t> references;
   std::string meta;
   uint32_t alignment = 256;
 };

@@ -8,7 +8,9 @@
 #include <functional>
 #include <limits>
 
+#include "collector.h"
 #include "hash.h"
+#include "ntree_scenes.h"
 #include "scenes.h"
 
 namespace lsp::corpus {
@@ -16,55 +18,6 @@ namespace {
 
 using format::RuleId;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-
-class Collector {
- public:
-  std::vector<InvalidFile> files;
-
-  void add(RuleId rule, const char* mutation, Bytes bytes, std::vector<std::string> arguments = {}) {
-    const std::string name = format::rule_label(rule) + "-" + format::rule(rule).name;
-    files.push_back({rule, name, mutation, std::move(arguments), std::move(bytes)});
-  }
-
-  // Each starts from the full scene; hashes are made after the change.
-  void image(RuleId rule, const char* mutation, const std::function<void(Image&)>& change,
-             std::vector<std::string> arguments = {}) {
-    Image image = full_scene();
-    change(image);
-    add(rule, mutation, encode(image), std::move(arguments));
-  }
-  void geometry(RuleId rule, const char* mutation, const std::function<void(Image&)>& change) {
-    image(rule, mutation, change, {"--level", "geometry"});
-  }
-  void header(RuleId rule, const char* mutation, const std::function<void(LspHeader&)>& change) {
-    bytes(rule, mutation, [&](Bytes& bytes) { change(header_of(bytes)); });
-  }
-  void sections(RuleId rule, const char* mutation, const std::function<void(Sections&)>& change) {
-    Sections sections = to_sections(full_scene());
-    change(sections);
-    add(rule, mutation, encode(sections));
-  }
-  void bytes(RuleId rule, const char* mutation, const std::function<void(Bytes&)>& change) {
-    Bytes bytes = encode(full_scene());
-    change(bytes);
-    repair_hashes(bytes);
-    add(rule, mutation, std::move(bytes));
-  }
-  // Like bytes(), but with the hashes left as they were.
-  void raw(RuleId rule, const char* mutation, const std::function<void(Bytes&)>& change) {
-    Bytes bytes = encode(full_scene());
-    change(bytes);
-    add(rule, mutation, std::move(bytes));
-  }
-  // Changes the stored frame of NODE in a packed file.
-  void frame(RuleId rule, const char* mutation, const std::function<void(Section&)>& change,
-             std::vector<std::string> arguments = {}) {
-    Sections sections = to_sections(full_scene());
-    pack(sections);
-    change(sections.sections[0]);
-    add(rule, mutation, encode(sections), std::move(arguments));
-  }
-};
 
 void identification(Collector& c) {
   c.raw(RuleId::kTooShort, "the file ends after 255 bytes", [](Bytes& b) { b.resize(255); });
@@ -389,6 +342,7 @@ std::vector<InvalidFile> invalid_files() {
   bits_and_candidates(collector);
   geometry(collector);
   metadata_and_source(collector);
+  break_ntrees(collector);
   return std::move(collector.files);
 }
 

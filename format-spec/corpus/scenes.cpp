@@ -5,66 +5,23 @@
 #include <bit>
 #include <cmath>
 
-#include "line_space.h"
-#include "octahedral.h"
+#include "line_space_tables.h"
+#include "ntree_scenes.h"
 
 namespace lsp::corpus {
 namespace {
 
-struct Vec {
-  double x, y, z;
-  double operator[](int axis) const { return axis == 0 ? x : axis == 1 ? y : z; }
-};
-Vec operator-(const Vec& a, const Vec& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-Vec cross(const Vec& a, const Vec& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-double dot(const Vec& a, const Vec& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-Vec to_vec(const lsp_float3& v) { return {v.x, v.y, v.z}; }
-lsp_float3 to_float3(const Vec& v) {
-  return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
-}
-
-struct Box {
-  lsp_float3 lo{INFINITY, INFINITY, INFINITY}, hi{-INFINITY, -INFINITY, -INFINITY};
-  void add(const lsp_float3& p) {
-    lo = {std::min(lo.x, p.x), std::min(lo.y, p.y), std::min(lo.z, p.z)};
-    hi = {std::max(hi.x, p.x), std::max(hi.y, p.y), std::max(hi.z, p.z)};
-  }
-};
-
-// Where a ray meets a triangle, in lengths of its direction; infinity: nowhere (Moeller and Trumbore 1997).
-double intersect(const Vec& origin, const Vec& direction, const LspTriangle& t) {
-  const Vec v0 = to_vec(t.v0), e1 = to_vec(t.v1) - v0, e2 = to_vec(t.v2) - v0;
-  const Vec p = cross(direction, e2);
-  const double det = dot(e1, p);
-  if (det == 0) return INFINITY;
-  const Vec s = origin - v0;
-  const double u = dot(s, p) / det;
-  const Vec q = cross(s, e1);
-  const double v = dot(direction, q) / det;
-  const double distance = dot(e2, q) / det;
-  return u >= 0 && v >= 0 && u + v <= 1 && distance >= 0 && distance <= 1 ? distance : INFINITY;
-}
-
-Vec patch_centroid(const LspLineSpace& space, uint32_t n, uint32_t face, uint32_t patch) {
-  const Vec lo = to_vec(space.lo), hi = to_vec(space.hi);
-  const int axis = static_cast<int>(face / 2);
-  double point[3] = {};
-  const int u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;
-  point[axis] = face % 2 == 0 ? lo[axis] : hi[axis];
-  point[u] = lo[u] + (hi[u] - lo[u]) * (patch % n + 0.5) / n;
-  point[v] = lo[v] + (hi[v] - lo[v]) * (patch / n + 0.5) / n;
-  return {point[0], point[1], point[2]};
-}
+double along(const lsp_float3& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
 
 class Builder {
  public:
   Builder(std::vector<LspTriangle> triangles, const SceneOptions& options)
-      : options_(options), input_(std::move(triangles)) {}
+      : options_(options),
+        input_(std::move(triangles)),
+        tables_({options.resolution, options.entry_bytes, options.dense}) {}
 
   Image run() {
-    Box bounds;
+    Box bounds = Box::nothing();
     for (const LspTriangle& t : input_)
       for (const lsp_float3* p : {&t.v0, &t.v1, &t.v2}) bounds.add(*p);
     LspHeader& header = image_.header;
@@ -127,22 +84,23 @@ class Builder {
     }
     if (!carries) return;
     line_space = index | (image_.line_spaces.size() == spaces_before ? LSP_TERMINAL_BIT : 0);
-    fill(index, child, box, triangle_first, static_cast<uint32_t>(image_.triangles.size()) - triangle_first);
+    tables_.fill(image_, index, child, box, triangle_first,
+                 static_cast<uint32_t>(image_.triangles.size()) - triangle_first);
   }
 
   // Halves the triangles along the longest axis, by the middle of their boxes.
   void split(LspNode& node, size_t first, size_t end, const Box& box, uint32_t depth) {
-    const Vec extent = to_vec(box.hi) - to_vec(box.lo);
-    const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
+    const auto extent = [&](int a) { return along(box.hi, a) - along(box.lo, a); };
+    const int axis = extent(0) >= extent(1) && extent(0) >= extent(2) ? 0 : extent(1) >= extent(2) ? 1 : 2;
     const auto middle = [&](const LspTriangle& t) {
-      const double a = to_vec(t.v0)[axis], b = to_vec(t.v1)[axis], c = to_vec(t.v2)[axis];
+      const double a = along(t.v0, axis), b = along(t.v1, axis), c = along(t.v2, axis);
       return std::min({a, b, c}) + std::max({a, b, c});
     };
     std::stable_sort(input_.begin() + static_cast<ptrdiff_t>(first),
                      input_.begin() + static_cast<ptrdiff_t>(end),
                      [&](const LspTriangle& a, const LspTriangle& b) { return middle(a) < middle(b); });
     const size_t half = (first + end) / 2;
-    Box boxes[2];
+    Box boxes[2] = {Box::nothing(), Box::nothing()};
     for (size_t i = first; i < end; ++i)
       for (const lsp_float3* p : {&input_[i].v0, &input_[i].v1, &input_[i].v2}) boxes[i >= half].add(*p);
     node.lo0 = boxes[0].lo;
@@ -153,96 +111,12 @@ class Builder {
     build(node.child1, node.line_space1, half, end, boxes[1], depth + 1);
   }
 
-  // Computes the Line Space of a node once its triangles are in place. Its words and candidates are kept
-  // apart until all are known, because a Line Space precedes those below it.
-  void fill(uint32_t index, uint32_t child, const Box& box, uint32_t triangle_first,
-            uint32_t triangle_count) {
-    LspLineSpace& space = image_.line_spaces[index];
-    const uint32_t n = options_.resolution;
-    const float margin = 0.015625f;
-    space.lo = {box.lo.x - margin, box.lo.y - margin, box.lo.z - margin};
-    space.hi = {box.hi.x + margin, box.hi.y + margin, box.hi.z + margin};
-    space.scale = {static_cast<float>(n) / (space.hi.x - space.lo.x),
-                   static_cast<float>(n) / (space.hi.y - space.lo.y),
-                   static_cast<float>(n) / (space.hi.z - space.lo.z)};
-    space.triangle_first = triangle_first;
-    space.triangle_count = triangle_count;
-    space.child = child;
-    const bool binary = options_.entry_bytes == 0;
-    space.format = n | options_.entry_bytes << LSP_FORMAT_ENTRY_SHIFT |
-                   (options_.dense ? LSP_FORMAT_DENSE : 0) | (binary ? LSP_FORMAT_SYMMETRIC : 0);
-
-    std::vector<uint32_t> shafts(format::shape_of(space.format).shafts, LSP_NONE);
-    for (uint32_t in = 0; in < 6; ++in)
-      for (uint32_t out = binary ? in + 1 : 0; out < 6; ++out) {
-        if (in == out) continue;
-        for (uint32_t p = 0; p < n * n; ++p)
-          for (uint32_t q = 0; q < n * n; ++q) {
-            const uint32_t shaft =
-                binary ? LSP_SHAFT_INDEX_SYMMETRIC(in, out, p, q, n) : LSP_SHAFT_INDEX(in, out, p, q, n);
-            shafts[shaft] = nearest(space, patch_centroid(space, n, in, p), patch_centroid(space, n, out, q));
-          }
-      }
-    for (uint32_t entry : shafts) space.filled += entry != LSP_NONE;
-    tables_.resize(image_.line_spaces.size());
-    tables_[index] = std::move(shafts);
-  }
-
-  uint32_t nearest(const LspLineSpace& space, const Vec& from, const Vec& to) const {
-    uint32_t best = LSP_NONE;
-    double distance = INFINITY;
-    for (uint32_t i = 0; i < space.triangle_count; ++i) {
-      const double d = intersect(from, to - from, image_.triangles[space.triangle_first + i]);
-      if (d < distance) {
-        distance = d;
-        best = i;
-      }
-    }
-    return best;
-  }
-
-  void pack_tables() {
-    for (size_t i = 0; i < image_.line_spaces.size(); ++i) {
-      LspLineSpace& space = image_.line_spaces[i];
-      const format::LineSpaceShape shape = format::shape_of(space.format);
-      const std::vector<uint32_t>& shafts = tables_[i];
-      space.word_first = shape.words == 0 ? 0 : static_cast<uint32_t>(image_.words.size());
-      const uint64_t candidate_words = shape.candidate_words(space.filled);
-      space.candidate_first = candidate_words == 0 ? 0 : static_cast<uint32_t>(image_.candidates.size());
-      image_.candidates.resize(image_.candidates.size() + candidate_words);
-      uint32_t filled = 0;
-      for (uint64_t first = 0; first < shape.words * 32; first += 32) {
-        LspBitWord word{0, filled};
-        for (uint64_t bit = 0; bit < 32 && first + bit < shafts.size(); ++bit)
-          if (shafts[first + bit] != LSP_NONE) word.bits |= 1u << bit;
-        filled += static_cast<uint32_t>(std::popcount(word.bits));
-        image_.words.push_back(word);
-      }
-      if (shape.entry_bytes == 0) continue;
-      auto* entries = reinterpret_cast<unsigned char*>(image_.candidates.data() + space.candidate_first);
-      for (uint32_t entry : shafts) {
-        if (entry == LSP_NONE && !shape.dense) continue;
-        for (uint32_t byte = 0; byte < shape.entry_bytes; ++byte)
-          *entries++ = static_cast<unsigned char>(entry >> 8 * byte);
-      }
-    }
-  }
-
   // Fills in what does not depend on the tree's shape.
   void shade() {
-    pack_tables();
-    if (options_.normals)
-      for (LspTriangle& t : image_.triangles) {
-        const Vec n = cross(to_vec(t.v1) - to_vec(t.v0), to_vec(t.v2) - to_vec(t.v0));
-        const uint32_t flat = format::encode_normal(to_float3(n));
-        const bool smooth = t.primitive % 2 == 1;
-        const uint32_t bent = format::encode_normal(to_float3({n.x + 0.1, n.y, n.z}));
-        image_.normals.push_back({flat, flat, smooth ? bent : flat});
-        t.flags = smooth && bent != flat ? LSP_TRIANGLE_SMOOTH : 0;
-      }
+    tables_.pack(image_);
+    if (options_.normals) add_normals(image_);
     if (options_.materials)
-      image_.materials = {{{0.8f, 0.8f, 0.8f}, 1.0f, {0, 0, 0}, 1.0f, 0.0f, {}},
-                          {{0.5f, 0.25f, 0.125f}, 0.5f, {2, 2, 1}, 0.25f, 1.0f, {}}};
+      add_materials(image_);
     else
       for (LspTriangle& t : image_.triangles) t.material = 0;
   }
@@ -250,8 +124,8 @@ class Builder {
   const SceneOptions& options_;
   std::vector<LspTriangle> input_;
   Image image_;
-  std::vector<std::vector<uint32_t>> tables_;  // per Line Space: the entry of every shaft
-  uint32_t ends_ = 0;                          // leaves, and Line Spaces in place of them
+  LineSpaceTables tables_;
+  uint32_t ends_ = 0;  // leaves, and Line Spaces in place of them
 };
 
 void add_quad(std::vector<LspTriangle>& triangles, const lsp_float3& a, const lsp_float3& b,
@@ -260,6 +134,8 @@ void add_quad(std::vector<LspTriangle>& triangles, const lsp_float3& a, const ls
   triangles.push_back({a, primitive, b, material, c, 0});
   triangles.push_back({a, primitive + 1, c, material, d, 0});
 }
+
+}  // namespace
 
 std::vector<LspTriangle> box_on_floor_triangles() {
   std::vector<LspTriangle> t;
@@ -272,6 +148,8 @@ std::vector<LspTriangle> box_on_floor_triangles() {
     add_quad(t, corner(f[0]), corner(f[1]), corner(f[2]), corner(f[3]), 1);
   return t;
 }
+
+namespace {
 
 Image empty_scene() {
   Image image = Builder({}, SceneOptions{}).run();
@@ -287,15 +165,6 @@ Image spatially_split() {
   LspNode& node = image.nodes[0];
   node.hi0 = {0, 1, 0};
   node.lo1 = {0, 0, 0};
-  return image;
-}
-
-Image ntree() {
-  Image image = box_on_floor({});
-  image.header.base_structure = LSP_BASE_NTREE;
-  image.header.required_features |= LSP_FEATURE_NTREE;
-  image.header.ntree_branching = 2;
-  image.header.ntree_depth = 3;
   return image;
 }
 
@@ -359,7 +228,21 @@ std::vector<ValidFile> valid_files() {
       encode(box_on_floor({.resolution = 1, .depths = {0}, .exact = false})));
   add("spatial-split", "one primitive in two leaves, each box around a part of it",
       encode(spatially_split()));
-  add("ntree", "an NTree as base structure", encode(ntree()));
+  add("ntree", "an NTree as base structure, three levels of nodes", encode(ntree_scene({.levels = 3})));
+  add("ntree-full", "an NTree with every section, Line Spaces on its root, its nodes and its leaves",
+      encode(full_ntree_scene()));
+  add("ntree-3", "27 cells a node: bits of GRID beyond the last cell; Line Spaces of nodes and small leaves",
+      encode(ntree_scene({.branching = 3, .resolution = 2, .depths = {1}})));
+  add("ntree-16", "4096 cells a node, 128 words of GRID",
+      encode(ntree_scene({.branching = 16, .levels = 1})));
+  add("ntree-approximate", "an NTree that is not exact: cells that hold a Line Space only",
+      encode(ntree_scene({.resolution = 1, .depths = {1}, .exact = false})));
+  add("ntree-approximate-root", "an NTree without a node: the root's Line Space stands for everything",
+      encode(ntree_scene({.resolution = 1, .depths = {0}, .exact = false})));
+  add("ntree-binary", "an NTree with binary Line Spaces",
+      encode(ntree_scene({.resolution = 2, .depths = {1}, .entry_bytes = 0})));
+  add("ntree-empty", "an NTree without geometry", encode(empty_ntree_scene()));
+  add("ntree-packed", "an NTree, every section packed", packed(full_ntree_scene()));
   add("align-4096", "sections at multiples of 4096", encode(with_alignment(full_scene(), 4096)));
   add("align-65536", "sections at multiples of 65536", encode(with_alignment(box_on_floor(one_leaf), 65536)));
   add("packed", "every section packed with zstd", packed(full_scene()));

@@ -20,6 +20,7 @@ struct SceneOptions {
 };
 
 // A box on a floor: 14 triangles, 2 materials.
+std::vector<LspTriangle> box_on_floor_triangles();
 Image box_on_floor(const SceneOptions& options);
 
 // The scene that mutations start from: all features, Line Spaces of N = 1 on two levels.

@@ -12,7 +12,7 @@ namespace {
 
 constexpr uint64_t kFirstElements = 4;     // listed of a folded section
 constexpr uint64_t kMetaCharacters = 120;  // shown of folded META
-constexpr uint64_t kCandidateWords = 8;    // to a line
+constexpr uint64_t kWords = 8;             // of CAND and REFS, to a line
 
 class Annotator {
  public:
@@ -64,7 +64,8 @@ class Annotator {
         put(left - std::min<uint64_t>(left, field.offset), path + "/" + field.name, "cut off");
         return;
       }
-      put(field.bytes, path + "/" + field.name, value_text(field, file_.data() + start));
+      put(field.bytes, path + "/" + field.name,
+          value_text(field, file_.data() + start, is_ntree(view_.header)));
     }
   }
 
@@ -103,26 +104,23 @@ class Annotator {
   void elements(Kind kind, uint64_t end, const std::string& path) {
     const bool full = options_.section == info(kind).name;
     if (kind == Kind::kMeta) return meta(end, path, full);
-    const uint64_t size = kind == Kind::kCand ? 4 * kCandidateWords : info(kind).element_bytes;
+    const uint64_t size = is_words(kind) ? 4 * kWords : info(kind).element_bytes;
     const uint64_t count = (end - at_) / size;
     const bool folded = !full && count > kFirstElements + 2;
     for (uint64_t i = 0; i < count; ++i) {
       if (folded && i == kFirstElements) {
         const uint64_t skipped = count - 1 - kFirstElements;
         put(skipped * size, path + "/" + name(kind, i) + "...",
-            std::to_string(skipped) + (kind == Kind::kCand ? " times 8 words" : " more elements"));
+            std::to_string(skipped) + (is_words(kind) ? " times 8 words" : " more elements"));
         i += skipped;
       }
       put(size, path + "/" + name(kind, i), element(kind, size));
     }
-    if (kind == Kind::kCand && end > at_)
-      put(end - at_, path + "/" + name(kind, count), element(kind, end - at_));
+    if (is_words(kind) && end > at_) put(end - at_, path + "/" + name(kind, count), element(kind, end - at_));
     if (end > at_) put(end - at_, path, "part of an element");
   }
 
-  static std::string name(Kind kind, uint64_t i) {
-    return std::to_string(kind == Kind::kCand ? i * kCandidateWords : i);
-  }
+  static std::string name(Kind kind, uint64_t i) { return std::to_string(is_words(kind) ? i * kWords : i); }
 
   std::string element(Kind kind, uint64_t size) const {
     std::string text;
@@ -138,8 +136,8 @@ class Annotator {
       return text;
     }
     for (const Field& field : owner->fields)
-      text +=
-          std::string(text.empty() ? "" : ", ") + field.name + " " + value_text(field, file_.data() + at_);
+      text += std::string(text.empty() ? "" : ", ") + field.name + " " +
+              value_text(field, file_.data() + at_, is_ntree(view_.header));
     return text;
   }
 

@@ -12,6 +12,14 @@ bool tree_sound(const Report& report) {
   return true;
 }
 
+// And the cells of an NTree be found.
+bool cells_sound(const Report& report) {
+  for (RuleId id : {RuleId::kGridOffset, RuleId::kGridTail, RuleId::kCellCountWrong, RuleId::kNtreeTooDeep,
+                    RuleId::kNtreeCube, RuleId::kRootReference})
+    if (report.has(id)) return false;
+  return true;
+}
+
 bool usable_or_absent(const FileView& view, Kind kind) {
   const Part& part = view.part(kind);
   return part.usable || (!part.present && declared_count(view.header, kind).value_or(0) == 0);
@@ -33,12 +41,21 @@ Report check_file(std::span<const std::byte> bytes, const CheckOptions& options)
   check_metadata(view, report);
   if (options.level < Level::kStructure) return report;
 
-  const bool tree = usable_or_absent(view, Kind::kNode) && usable_or_absent(view, Kind::kTria);
-  if (tree) check_tree(view, report);
+  const bool ntree = is_ntree(view.header);
+  bool tree = usable_or_absent(view, Kind::kTria);
+  if (ntree)
+    tree = tree && ntree_readable(view.header) && usable_or_absent(view, Kind::kGrid) &&
+           usable_or_absent(view, Kind::kCell) && usable_or_absent(view, Kind::kRefs);
+  else
+    tree = tree && usable_or_absent(view, Kind::kNode);
+  if (tree) ntree ? check_ntree(view, report) : check_tree(view, report);
   if (view.part(Kind::kLspc).usable) check_line_spaces(view, report);
   if (options.level < Level::kGeometry) return report;
 
-  if (tree && tree_sound(report)) check_geometry(view, report);
+  if (tree && tree_sound(report)) {
+    check_geometry(view, report);
+    if (ntree && cells_sound(report)) check_ntree_geometry(view, report);
+  }
   return report;
 }
 

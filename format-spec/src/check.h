@@ -1,8 +1,9 @@
 // Checks an .lsp file in memory against the rule catalogue.
 //
 // The bytes may be hostile. No count, offset or size of the file is used before it was checked against the
-// bytes that are there; memory used beyond the file is at most `memory_limit` for unpacked sections, some 30 bytes a
-// node of a damaged tree and, at the level geometry, some 30 bytes a triangle. Nothing is written, no thread is started.
+// bytes that are there; memory used beyond the file is at most `memory_limit` for unpacked sections, some 30
+// bytes a node of a damaged tree and, at the level geometry, some 30 bytes a triangle. Nothing is written, no
+// thread is started.
 #pragma once
 
 #include <cstddef>

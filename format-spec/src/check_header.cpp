@@ -66,9 +66,8 @@ void check_root(const LspHeader& header, Report& report) {
   } else if (header.root == LSP_NONE) {
     if (header.triangle_count != 0 && header.root_line_space == LSP_NONE)
       LSP_HEADER_FINDING(kRootReference, root, "is none, but the file has triangles");
-  } else if ((header.root & LSP_LEAF_BIT) == 0) {
-    LSP_HEADER_FINDING(kRootReference, root,
-                       "names node " + std::to_string(header.root) + ", but there are none");
+  } else if ((header.root & LSP_LEAF_BIT) == 0 || is_ntree(header)) {
+    LSP_HEADER_FINDING(kRootReference, root, "is " + hex(header.root) + ", but there are no nodes");
   } else {
     const uint64_t first = header.root & LSP_LEAF_FIRST_MASK;
     const uint64_t count = (header.root >> LSP_LEAF_COUNT_SHIFT & LSP_LEAF_COUNT_MASK) + 1;
@@ -85,6 +84,21 @@ void check_root(const LspHeader& header, Report& report) {
                            " of " + std::to_string(header.line_space_count));
 }
 
+void check_cube(const LspHeader& header, Report& report) {
+  const lsp_float3& lo = header.ntree_lo;
+  const double size = header.ntree_size;
+  if (!finite(lo) || !(size > 0 && std::isfinite(size)) ||
+      !(header.ntree_margin >= 0 && std::isfinite(header.ntree_margin))) {
+    LSP_HEADER_FINDING(kNtreeCube, ntree_lo, "the cube or its margin is not finite, or not positive");
+    return;
+  }
+  const lsp_float3 &min = header.bounds_min, &max = header.bounds_max;
+  const bool inside = min.x >= lo.x && min.y >= lo.y && min.z >= lo.z && max.x <= lo.x + size &&
+                      max.y <= lo.y + size && max.z <= lo.z + size;
+  if (!inside && header.node_count != 0)
+    LSP_HEADER_FINDING(kNtreeCube, ntree_lo, "the bounds reach outside the cube");
+}
+
 void check_base(const LspHeader& header, Report& report) {
   const bool ntree = header.base_structure == LSP_BASE_NTREE;
   if ((header.base_structure != LSP_BASE_BVH && !ntree) ||
@@ -92,14 +106,16 @@ void check_base(const LspHeader& header, Report& report) {
     LSP_HEADER_FINDING(kBaseStructure, base_structure,
                        "is " + std::to_string(header.base_structure) + " with the feature bit NTREE " +
                            (header.required_features & LSP_FEATURE_NTREE ? "set" : "clear"));
-  const bool sound = ntree ? header.ntree_branching >= 2 && header.ntree_branching <= 32 &&
-                                 header.ntree_depth >= 1 && header.ntree_depth <= LSP_MAX_STACK
-                           : header.ntree_branching == 0 && header.ntree_depth == 0;
-  if (!sound)
+  const lsp_float3& lo = header.ntree_lo;
+  const bool zero = header.ntree_branching == 0 && header.ntree_depth == 0 && header.cell_count == 0 &&
+                    header.reference_count == 0 && lo.x == 0 && lo.y == 0 && lo.z == 0 &&
+                    header.ntree_size == 0 && header.ntree_margin == 0;
+  if (ntree ? !ntree_readable(header) : !zero)
     LSP_HEADER_FINDING(kNtreeParameters, ntree_branching,
                        "branching " + std::to_string(header.ntree_branching) + " and depth " +
-                           std::to_string(header.ntree_depth) + " do not fit base structure " +
-                           std::to_string(header.base_structure));
+                           std::to_string(header.ntree_depth) + ", or what is stated of cells, do not fit " +
+                           "base structure " + std::to_string(header.base_structure));
+  if (ntree) check_cube(header, report);
 }
 
 void check_limits(const LspHeader& header, Report& report) {
@@ -108,11 +124,12 @@ void check_limits(const LspHeader& header, Report& report) {
   if (header.max_depth > LSP_MAX_STACK)
     LSP_HEADER_FINDING(kDepthBound, max_depth,
                        "is " + std::to_string(header.max_depth) + ", the limit is 96");
-  if (header.max_steps > 2 * uint64_t{header.node_count} + kStepsSlack)
+  const uint64_t steps = is_ntree(header) ? ntree_steps(header) : 2 * uint64_t{header.node_count};
+  if (header.max_steps > steps + kStepsSlack)
     LSP_HEADER_FINDING(
         kStepsBound, max_steps,
         "is " + std::to_string(header.max_steps) + " for " + std::to_string(header.node_count) + " nodes");
-  if (header.max_leaf_triangles > LSP_MAX_LEAF_TRIANGLES)
+  if (header.max_leaf_triangles > LSP_MAX_LEAF_TRIANGLES && !is_ntree(header))
     LSP_HEADER_FINDING(kMaxLeaf, max_leaf_triangles,
                        "is " + std::to_string(header.max_leaf_triangles) + ", the limit is 16");
   if (header.section_count > kMaxSections)
@@ -120,12 +137,12 @@ void check_limits(const LspHeader& header, Report& report) {
         kSectionCount, section_count,
         "is " + std::to_string(header.section_count) + ", the limit is " + std::to_string(kMaxSections));
   if (header.node_count > kMaxReferences || header.triangle_count > LSP_LEAF_FIRST_MASK + 1 ||
-      header.line_space_count > kMaxReferences)
-    LSP_HEADER_FINDING(kAddressable, node_count,
-                       std::to_string(header.node_count) + " nodes, " +
-                           std::to_string(header.triangle_count) + " triangles and " +
-                           std::to_string(header.line_space_count) +
-                           " Line Spaces are more than references can name");
+      header.line_space_count > kMaxReferences || header.reference_count >= LSP_LEAF_BIT)
+    LSP_HEADER_FINDING(
+        kAddressable, node_count,
+        std::to_string(header.node_count) + " nodes, " + std::to_string(header.triangle_count) +
+            " triangles, " + std::to_string(header.reference_count) + " references and " +
+            std::to_string(header.line_space_count) + " Line Spaces are more than references can name");
   if (header.resolution > LSP_MAX_RESOLUTION || (header.resolution == 0 && header.line_space_count != 0))
     LSP_HEADER_FINDING(kBakeParameters, resolution, "is " + std::to_string(header.resolution));
 }

@@ -44,6 +44,7 @@ class TableCheck {
       sound = false;
     }
     flags(i, kind);
+    base(i, kind);
     if (section.codec > LSP_CODEC_ZSTD) {
       LSP_TABLE_FINDING(kUnknownCodec, i, codec, "codec " + std::to_string(section.codec) + " is not known");
       sound = false;
@@ -73,6 +74,16 @@ class TableCheck {
       wrong = wrong || (expected.required && !required) || (expected.optional && required);
     }
     if (wrong) LSP_TABLE_FINDING(kSectionFlags, i, flags, "flags are " + std::to_string(section.flags));
+  }
+
+  // The tree of one base structure in the file of the other.
+  void base(uint64_t i, int kind) {
+    if (kind == kKinds) return;
+    const Kind known = static_cast<Kind>(kind);
+    const bool cells = known == Kind::kGrid || known == Kind::kCell || known == Kind::kRefs;
+    if (is_ntree(view_.header) ? known == Kind::kNode : cells)
+      LSP_TABLE_FINDING(kOtherBase, i, type,
+                        is_ntree(view_.header) ? "the file holds an NTree" : "the file holds no NTree");
   }
 
   bool sizes(uint64_t i, int kind) {

@@ -202,9 +202,10 @@ std::string hex(uint64_t value, int digits) {
   return text;
 }
 
-std::string child_text(uint32_t value) {
+std::string child_text(uint32_t value, bool ntree) {
   if (value == LSP_NONE) return "none";
   if (!(value & LSP_LEAF_BIT)) return "node " + std::to_string(value);
+  if (ntree) return "leaf from " + std::to_string(value & ~LSP_LEAF_BIT);
   const uint32_t count = (value >> LSP_LEAF_COUNT_SHIFT & LSP_LEAF_COUNT_MASK) + 1;
   return "leaf of " + std::to_string(count) + " from " + std::to_string(value & LSP_LEAF_FIRST_MASK);
 }
@@ -221,9 +222,9 @@ std::string format_text(uint32_t value) {
          (value & LSP_FORMAT_CONSERVATIVE ? ", conservative" : "");
 }
 
-std::string uint_text(std::string_view name, uint32_t value) {
-  if (name.starts_with("child") || name == "root") return child_text(value);
-  if (name.starts_with("line_space0") || name.starts_with("line_space1") || name == "root_line_space")
+std::string uint_text(std::string_view name, uint32_t value, bool ntree) {
+  if (name.starts_with("child") || name == "root") return child_text(value, ntree);
+  if (name == "line_space" || name == "line_space0" || name == "line_space1" || name == "root_line_space")
     return line_space_text(value);
   if (name == "format") return format_text(value);
   if (name == "type") return type_name(value);
@@ -268,16 +269,20 @@ const Struct* element_struct(Kind kind) {
       return &struct_named("LspMaterial");
     case Kind::kLspc:
       return &struct_named("LspLineSpace");
+    case Kind::kCell:
+      return &struct_named("LspCell");
     case Kind::kBits:
+    case Kind::kGrid:
       return &struct_named("LspBitWord");
     case Kind::kCand:
+    case Kind::kRefs:
     case Kind::kMeta:
       break;
   }
   return nullptr;
 }
 
-std::string value_text(const Field& field, const std::byte* bytes) {
+std::string value_text(const Field& field, const std::byte* bytes, bool ntree) {
   std::string text;
   const uint32_t size = field.bytes / field.count();
   for (uint32_t i = 0; i < field.count(); ++i) {
@@ -285,7 +290,7 @@ std::string value_text(const Field& field, const std::byte* bytes) {
     if (i != 0) text += " ";
     switch (field.type) {
       case FieldType::kUint:
-        text += uint_text(field.name, load<uint32_t>(at));
+        text += uint_text(field.name, load<uint32_t>(at), ntree);
         break;
       case FieldType::kUint64: {
         const bool hash = std::string_view(field.name).find("hash") != std::string_view::npos;

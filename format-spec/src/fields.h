@@ -31,11 +31,12 @@ struct Struct {
 std::span<const Struct> structs();
 const Struct& struct_named(const char* name);
 
-// The struct of a section's element; null for CAND and META, whose elements are words and characters.
+// The struct of a section's element; null for CAND and REFS, whose elements are words, and META's characters.
 const Struct* element_struct(Kind kind);
+inline bool is_words(Kind kind) { return kind == Kind::kCand || kind == Kind::kRefs; }
 
 // The field's value in a struct at `bytes`: "12", "0x80000003", "(0, 1, 2.5)". References, formats and types
-// are given with their meaning.
-std::string value_text(const Field& field, const std::byte* bytes);
+// are given with their meaning, child references with that of the tree.
+std::string value_text(const Field& field, const std::byte* bytes, bool ntree = false);
 
 }  // namespace lsp::format

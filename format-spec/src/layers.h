@@ -23,10 +23,21 @@ void check_source(const FileView& view, Hash128 source, Report& report);
 
 // Needs NODE and TRIA to be usable or absent.
 void check_tree(const FileView& view, Report& report);
+// The same of an NTree. Needs GRID, CELL, REFS and TRIA to be usable or absent, and ntree_readable.
+void check_ntree(const FileView& view, Report& report);
 // Needs LSPC; looks at BITS and CAND where they are usable.
 void check_line_spaces(const FileView& view, Report& report);
 // Needs a tree whose references are in range, and whole sections.
 void check_geometry(const FileView& view, Report& report);
+// Needs the same of an NTree, and GRID in order.
+void check_ntree_geometry(const FileView& view, Report& report);
+
+// Steps of a traversal of an NTree at most: of every node the cells along a line and the way out of it, or
+// all filled cells, and every reference.
+inline uint64_t ntree_steps(const LspHeader& header) {
+  return uint64_t{3} * header.ntree_branching * header.node_count + header.cell_count +
+         header.reference_count;
+}
 
 // "/sections/NODE/12/child1"
 inline std::string element_path(Kind kind, uint64_t index, const char* field = nullptr) {

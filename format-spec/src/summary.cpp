@@ -2,6 +2,7 @@
 
 #include <lsp/program.h>
 
+#include <bit>
 #include <cstdarg>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -57,12 +58,20 @@ class DepthTable {
  public:
   explicit DepthTable(const FileView& view)
       : nodes_(view.elements<LspNode>(Kind::kNode)),
+        grid_(ntree_readable(view.header) ? view.elements<LspBitWord>(Kind::kGrid)
+                                          : std::span<const LspBitWord>()),
+        cells_(view.elements<LspCell>(Kind::kCell)),
         spaces_(view.elements<LspLineSpace>(Kind::kLspc)),
         header_(view.header) {}
 
   std::vector<Row> run() {
-    depth_.assign(nodes_.size(), kUnseen);
+    const uint32_t words = is_ntree(header_) ? LSP_GRID_WORDS(header_.ntree_branching) : 0;
+    depth_.assign(grid_.empty() ? nodes_.size() : grid_.size() / words, kUnseen);
     child(header_.root, header_.root_line_space, 0, 0);
+    if (is_ntree(header_)) {
+      if (!grid_.empty()) visit_cells(words);
+      return std::move(rows_);
+    }
     for (uint64_t i = 0; i < nodes_.size(); ++i) {
       if (depth_[i] == kUnseen) continue;
       child(nodes_[i].child0, nodes_[i].line_space0, depth_[i] + 1, i);
@@ -75,7 +84,21 @@ class DepthTable {
   static constexpr uint32_t kUnseen = LSP_NONE;
   static constexpr uint32_t kMaxRows = 256;  // a damaged file may claim a chain of any length
 
-  void child(uint32_t reference, uint32_t line_space, uint32_t depth, uint64_t parent) {
+  // The cells of the nodes that some cell before them names, as many as a word has bits and CELL has left.
+  void visit_cells(uint32_t words) {
+    for (uint64_t i = 0; i < depth_.size(); ++i) {
+      if (depth_[i] == kUnseen) continue;
+      for (uint64_t w = i * words; w < (i + 1) * words; ++w) {
+        const uint64_t first = grid_[w].offset;
+        const uint64_t count = static_cast<uint64_t>(std::popcount(grid_[w].bits));
+        for (uint64_t c = first; c < first + count && c < cells_.size(); ++c)
+          child(cells_[c].child, cells_[c].line_space, depth_[i] + 1, i, cells_[c].count);
+      }
+    }
+  }
+
+  // `count`: references of an NTree's leaf.
+  void child(uint32_t reference, uint32_t line_space, uint32_t depth, uint64_t parent, uint32_t count = 0) {
     if (depth >= kMaxRows) return;
     if (rows_.size() <= depth) rows_.resize(depth + 1);
     Row& row = rows_[depth];
@@ -88,8 +111,9 @@ class DepthTable {
     if (reference == LSP_NONE) return;
     if (reference & LSP_LEAF_BIT) {
       ++row.leaves;
-      row.triangles += (reference >> LSP_LEAF_COUNT_SHIFT & LSP_LEAF_COUNT_MASK) + 1;
-    } else if (reference < nodes_.size() && (reference > parent || (reference == 0 && depth == 0)) &&
+      row.triangles +=
+          is_ntree(header_) ? count : (reference >> LSP_LEAF_COUNT_SHIFT & LSP_LEAF_COUNT_MASK) + 1;
+    } else if (reference < depth_.size() && (reference > parent || (reference == 0 && depth == 0)) &&
                depth_[reference] == kUnseen) {
       ++row.nodes;
       depth_[reference] = depth;
@@ -97,6 +121,8 @@ class DepthTable {
   }
 
   std::span<const LspNode> nodes_;
+  std::span<const LspBitWord> grid_;  // of an NTree, as the cells
+  std::span<const LspCell> cells_;
   std::span<const LspLineSpace> spaces_;
   const LspHeader& header_;
   std::vector<uint32_t> depth_;
@@ -183,7 +209,11 @@ Json summarize(std::span<const std::byte> file, const std::string& name, uint64_
   json["counts"] = {{"primitives", header.primitive_count}, {"triangles", header.triangle_count},
                     {"nodes", header.node_count},           {"line_spaces", header.line_space_count},
                     {"bit_words", header.bit_word_count},   {"candidate_words", header.candidate_word_count},
-                    {"materials", header.material_count}};
+                    {"materials", header.material_count},   {"cells", header.cell_count},
+                    {"references", header.reference_count}};
+  if (is_ntree(header))
+    json["ntree"] = {
+        {"lo", vec(header.ntree_lo)}, {"size", header.ntree_size}, {"margin", header.ntree_margin}};
   json["limits"] = {{"max_depth", header.max_depth},
                     {"max_stack", header.max_stack},
                     {"max_steps", header.max_steps},
@@ -241,6 +271,11 @@ std::string summary_text(const Json& j, const std::string& section) {
                c["primitives"].get<unsigned long long>(), c["triangles"].get<unsigned long long>(),
                c["nodes"].get<unsigned long long>(), c["line_spaces"].get<unsigned long long>(),
                c["materials"].get<unsigned long long>());
+  if (j.contains("ntree"))
+    text += line("NTree of branching %u, %u levels: %llu filled cells, %llu references (%.2f a triangle)\n",
+                 p["ntree_branching"].get<unsigned>(), p["ntree_depth"].get<unsigned>(),
+                 c["cells"].get<unsigned long long>(), c["references"].get<unsigned long long>(),
+                 ratio(c["references"].get<uint64_t>(), c["triangles"].get<uint64_t>()));
   text += "\n" + head;
   for (const Json& s : j["sections"]) text += section_line(s);
   text += line("  padding %25llu\n", j["padding_bytes"].get<unsigned long long>());

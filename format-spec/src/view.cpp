@@ -15,6 +15,9 @@ constexpr KindInfo kInfos[kKinds] = {
     {LSP_SECTION_LSPC, "LSPC", sizeof(LspLineSpace), true, false},
     {LSP_SECTION_BITS, "BITS", sizeof(LspBitWord), true, false},
     {LSP_SECTION_CAND, "CAND", sizeof(uint32_t), true, false},
+    {LSP_SECTION_GRID, "GRID", sizeof(LspBitWord), true, false},
+    {LSP_SECTION_CELL, "CELL", sizeof(LspCell), true, false},
+    {LSP_SECTION_REFS, "REFS", sizeof(uint32_t), true, false},
     {LSP_SECTION_META, "META", 1, false, true},
 };
 
@@ -28,10 +31,17 @@ int kind_of(uint32_t type) {
   return kKinds;
 }
 
+bool is_ntree(const LspHeader& header) { return header.base_structure == LSP_BASE_NTREE; }
+
+bool ntree_readable(const LspHeader& header) {
+  return is_ntree(header) && header.ntree_branching >= 2 && header.ntree_branching <= LSP_MAX_BRANCHING &&
+         header.ntree_depth >= 1 && header.ntree_depth <= LSP_MAX_NTREE_DEPTH;
+}
+
 std::optional<uint64_t> declared_count(const LspHeader& header, Kind kind) {
   switch (kind) {
     case Kind::kNode:
-      return header.node_count;
+      return is_ntree(header) ? 0 : header.node_count;
     case Kind::kTria:
     case Kind::kNrml:
       return header.triangle_count;
@@ -43,6 +53,14 @@ std::optional<uint64_t> declared_count(const LspHeader& header, Kind kind) {
       return header.bit_word_count;
     case Kind::kCand:
       return header.candidate_word_count;
+    case Kind::kGrid:
+      if (!is_ntree(header)) return 0;
+      if (!ntree_readable(header)) break;
+      return uint64_t{header.node_count} * LSP_GRID_WORDS(header.ntree_branching);
+    case Kind::kCell:
+      return header.cell_count;
+    case Kind::kRefs:
+      return header.reference_count;
     case Kind::kMeta:
       break;
   }

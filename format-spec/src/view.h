@@ -15,8 +15,8 @@
 namespace lsp::format {
 
 // The section types of version 1.0 in the order of the file.
-enum class Kind { kNode, kTria, kNrml, kMatl, kLspc, kBits, kCand, kMeta };
-inline constexpr int kKinds = 8;
+enum class Kind { kNode, kTria, kNrml, kMatl, kLspc, kBits, kCand, kGrid, kCell, kRefs, kMeta };
+inline constexpr int kKinds = 11;
 
 struct KindInfo {
   uint32_t type;  // LSP_SECTION_*
@@ -30,7 +30,12 @@ const KindInfo& info(Kind kind);
 // The kind of a section type; kKinds for one that this version does not define.
 int kind_of(uint32_t type);
 
-// How many elements the header says that a section has; nothing for META.
+// Whether the header says that the tree is an NTree, and with parameters in range: GRID can be read.
+bool is_ntree(const LspHeader& header);
+bool ntree_readable(const LspHeader& header);
+
+// How many elements the header says that a section has; nothing for META, and for GRID where the header's
+// parameters are out of range.
 std::optional<uint64_t> declared_count(const LspHeader& header, Kind kind);
 
 // "NODE", or eight hexadecimal digits where a character is not printable.

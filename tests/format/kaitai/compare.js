@@ -9,12 +9,23 @@ const { execFileSync } = require('child_process');
 const compiler = require('kaitai-struct-compiler');
 const KaitaiStream = require('kaitai-struct/KaitaiStream');
 const yaml = require('yaml');
+const fzstd = require('fzstd');
+
+// What lsp.ksy calls zstd_frame: a whole frame that unfolds to so many bytes.
+class ZstdFrame {
+  constructor(bytes) { this.bytes = bytes; }
+  decode(frame) {
+    const data = fzstd.decompress(frame);
+    assert.strictEqual(data.length, Number(this.bytes), 'a frame of another size');
+    return data;
+  }
+}
 
 async function compile(path) {
   const description = yaml.parse(fs.readFileSync(path, 'utf8'));
   const files = await compiler.compile('javascript', description, null, false);
   const module_ = { exports: {} };
-  new Function('module', 'exports', 'require', files['Lsp.js'])(module_, module_.exports, require);
+  new Function('module', 'exports', 'require', files['Lsp.js'])(module_, module_.exports, (name) => (name.endsWith('ZstdFrame') ? { ZstdFrame } : require(name)));
   return module_.exports.Lsp || module_.exports;
 }
 
@@ -34,6 +45,7 @@ function plain(value, name, owner) {
     switch (value.constructor.name) {
       case 'Vec3': return [bits(value.x), bits(value.y), bits(value.z)];
       case 'ChildReference':
+      case 'CellReference':
       case 'LineSpaceReference':
       case 'LineSpaceFormat': return value.value;
       case 'Octahedral': return ((value.x & 0xffff) | (value.y << 16)) >>> 0;
@@ -60,9 +72,11 @@ function dump(Lsp, path) {
   const lsp = new Lsp(new KaitaiStream(fs.readFileSync(path)));
   const sections = lsp.sections.map((section) => {
     const result = fields(section);
-    const body = section.body;
-    if (body === undefined || body instanceof Uint8Array) {
-      result.stored = hex(section.stored);
+    const packed = section.codec !== 0;
+    const body = packed ? section.unpackedBody : section.body;
+    if (packed || body instanceof Uint8Array) result.stored = hex(section.stored);
+    if (body instanceof Uint8Array) {
+      // A section of no known type.
     } else if (body.elements !== undefined) {
       result.elements = body.elements.map(fields);
     } else if (body.words !== undefined) {

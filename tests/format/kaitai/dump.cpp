@@ -3,10 +3,12 @@
 #include <cstdio>
 #include <cstring>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <string_view>
 
 #include "fields.h"
 #include "file.h"
+#include "layers.h"
 #include "view.h"
 
 namespace {
@@ -61,20 +63,19 @@ Json struct_of(const Struct& owner, const std::byte* bytes) {
   return json;
 }
 
-Json section_of(const LspSection& entry, std::span<const std::byte> file) {
+Json section_of(const LspSection& entry, const FileView& view) {
   Json json = struct_of(struct_named("LspSection"), reinterpret_cast<const std::byte*>(&entry));
-  const std::span<const std::byte> data = file.subspan(entry.offset, entry.stored_bytes);
   const int kind = kind_of(entry.type);
-  if (entry.codec != LSP_CODEC_NONE || kind == kKinds) {
-    json["stored"] = hex(data.data(), data.size());
-    return json;
-  }
+  if (entry.codec != LSP_CODEC_NONE || kind == kKinds)
+    json["stored"] = hex(view.bytes.data() + entry.offset, entry.stored_bytes);
+  if (kind == kKinds) return json;
+  const std::span<const std::byte> data = view.part(static_cast<Kind>(kind)).data;
   const Struct* owner = element_struct(static_cast<Kind>(kind));
   if (owner != nullptr) {
     json["elements"] = Json::array();
     for (size_t i = 0; i < data.size(); i += owner->bytes)
       json["elements"].push_back(struct_of(*owner, data.data() + i));
-  } else if (static_cast<Kind>(kind) == Kind::kCand) {
+  } else if (is_words(static_cast<Kind>(kind))) {
     json["words"] = Json::array();
     for (size_t i = 0; i < data.size(); i += 4) json["words"].push_back(word(data.data() + i));
   } else {
@@ -89,11 +90,15 @@ int main(int argc, char** argv) {
   if (argc != 2) return 1;
   try {
     const MappedFile file(argv[1]);
-    const FileView view = view_file(file.bytes());
+    FileView view = view_file(file.bytes());
+    Report report;
+    check_sections(view, report);
+    check_hashes_and_codec(view, uint64_t{1} << 28, report);
+    if (report.verdict() != Verdict::kValid) throw std::runtime_error("is damaged");
     Json json;
     json["header"] = struct_of(struct_named("LspHeader"), file.bytes().data());
     json["sections"] = Json::array();
-    for (const LspSection& entry : view.table) json["sections"].push_back(section_of(entry, file.bytes()));
+    for (const LspSection& entry : view.table) json["sections"].push_back(section_of(entry, view));
     std::puts(json.dump().c_str());
     return 0;
   } catch (const std::exception& error) {

@@ -16,7 +16,7 @@ for tool in node npm; do
 done
 mkdir -p "$folder"
 cp "$here/package.json" "$here/compare.js" "$folder/"
-if [ ! -d "$folder/node_modules/kaitai-struct-compiler" ]; then
+if [ ! -d "$folder/node_modules/kaitai-struct-compiler" ] || [ ! -d "$folder/node_modules/fzstd" ]; then
   if ! (cd "$folder" && npm install --no-audit --no-fund --loglevel=error); then
     echo "SKIPPED: npm could not fetch kaitai-struct-compiler; is there a network?"
     exit 77
