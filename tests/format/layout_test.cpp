@@ -190,6 +190,36 @@ TEST(Layout, TheWorkedExamples) {
   EXPECT_EQ(0x98000007u >> LSP_LEAF_COUNT_SHIFT & LSP_LEAF_COUNT_MASK, 3u);
 }
 
+// "Finding a cell" of an NTree.
+TEST(Layout, TheWorkedExampleOfAnNTree) {
+  const LspBitWord grid[] = {{0x00002011u, 0}, {0x04000200u, 3}};
+  const LspCell cells[] = {{0x80000000u, 2, LSP_NONE},
+                           {1, 0, LSP_NONE},
+                           {0x80000002u, 1, LSP_NONE},
+                           {0x80000003u, 1, LSP_NONE},
+                           {0x80000004u, 2, LSP_NONE}};
+  const uint32_t references[] = {0, 5, 2, 5, 1, 5};
+  const float point[3] = {5.5f, 5.2f, 2.7f};
+  uint32_t node = 0, origin[3] = {0, 0, 0};
+  const LspCell* cell = nullptr;
+  for (float size : {3.0f, 1.0f}) {
+    uint32_t at[3];
+    for (int axis = 0; axis < 3; ++axis) at[axis] = static_cast<uint32_t>(point[axis] / size);
+    const uint32_t index = LSP_CELL_INDEX(at[0] - origin[0], at[1] - origin[1], at[2] - origin[2], 3u);
+    EXPECT_EQ(index, size == 3.0f ? 4u : 26u);
+    const LspBitWord word = grid[node * LSP_GRID_WORDS(3u) + index / 32];
+    ASSERT_EQ(word.bits >> index % 32 & 1, 1u);
+    const uint32_t below = word.bits & ((1u << index % 32) - 1);
+    cell = &cells[word.offset + static_cast<uint32_t>(__builtin_popcount(below))];
+    node = cell->child;
+    for (int axis = 0; axis < 3; ++axis) origin[axis] = at[axis] * 3;
+  }
+  ASSERT_EQ(cell, &cells[4]);
+  const uint32_t first = cell->child & ~LSP_LEAF_BIT;
+  EXPECT_EQ(references[first], 1u);
+  EXPECT_EQ(references[first + 1], 5u);
+}
+
 // Every ordered pair of faces and patches has a shaft of its own, and the numbers are dense.
 TEST(Layout, ShaftNumbersAreDense) {
   for (uint32_t n : {1u, 2u, 3u}) {

@@ -15,7 +15,7 @@ for name in open trace packed; do
   mkdir -p "$work/corpus-$name"
   log=$work/$name.log
   LLVM_PROFILE_FILE="$work/$name.profraw" "$build/bin/fuzz_format_$name" -max_total_time="$seconds" -timeout=10 \
-    -max_len=8192 -rss_limit_mb=3000 -dict="$here/lsp.dict" -print_final_stats=1 -artifact_prefix="$work/$name-" \
+    -max_len=12288 -rss_limit_mb=3000 -dict="$here/lsp.dict" -print_final_stats=1 -artifact_prefix="$work/$name-" \
     "$work/corpus-$name" "$root"/format-spec/corpus/*/valid "$root"/format-spec/corpus/*/invalid >"$log" 2>&1 ||
     { findings=1; echo "fuzz_format_$name: FINDING, see $log"; }
   executions=$(sed -n 's/^stat::number_of_executed_units: *//p' "$log")
