@@ -11,6 +11,7 @@
 #include "line_space.h"
 #include "lsp/layout.h"
 #include "mesh.h"
+#include "ntree.h"
 
 namespace lsp {
 
@@ -23,10 +24,14 @@ enum class Purpose {
   kAll,
 };
 
+enum class Base { kBvh, kNTree };
+
 struct BakeOptions {
   Purpose purpose = Purpose::kAll;
+  Base base = Base::kBvh;
   bool line_spaces = true;
   BvhOptions bvh;
+  NTreeOptions ntree;
   LineSpaceOptions line_space;
   float plane_tolerance = 0.0f;         // LspHeader.plane_tolerance
   float normal_angle_degrees = 180.0f;  // LspHeader.normal_angle_cos; 180: no hit is rejected
@@ -36,7 +41,8 @@ struct BakeOptions {
 // The sections of a file, and the header but for what the writer knows (sizes, offsets, hashes).
 struct Baked {
   LspHeader header{};
-  std::vector<LspNode> nodes;
+  std::vector<LspNode> nodes;  // of a BVH
+  NTree ntree;                 // or of an NTree
   std::vector<LspTriangle> triangles;
   std::vector<LspCornerNormals> normals;  // empty: no section
   std::vector<LspMaterial> materials;     // empty: no section
@@ -49,11 +55,23 @@ struct Baked {
 // Called with the stage's name and the share of it done, from any thread.
 using Progress = std::function<void(std::string_view stage, double done)>;
 
-// The result is exact and approximate. Throws Failure with Exit::kLimit when the memory limit would be exceeded.
+// The result is exact and approximate. Throws Failure with Exit::kLimit when the memory limit would be
+// exceeded.
 Baked bake(const Mesh& mesh, const BakeOptions& options, const Progress& progress = {});
 
 // Leaves out of `baked` what only exact traces need: nodes below terminal Line Spaces and the triangles there
 // that no shaft refers to.
 void keep_approximate_only(Baked& baked);
+
+// Sets the header's counts, and what follows from them, to those of the sections.
+void set_counts(Baked& baked);
+
+// A number for people: 1,234,567.
+std::string with_commas(uint64_t n);
+
+// Bytes of a candidate entry; 0 in a binary Line Space.
+inline uint32_t entry_bytes(const LspLineSpace& r) {
+  return r.format >> LSP_FORMAT_ENTRY_SHIFT & LSP_FORMAT_ENTRY_MASK;
+}
 
 }  // namespace lsp

@@ -42,6 +42,9 @@ lsp_scene view(const Baked& baked) {
   lsp_scene scene{};
   scene.header = &baked.header;
   scene.nodes = baked.nodes.data();
+  scene.grid = baked.ntree.grid.data();
+  scene.cells = baked.ntree.cells.data();
+  scene.references = baked.ntree.references.data();
   scene.triangles = baked.triangles.data();
   scene.line_spaces = baked.line_spaces.records.data();
   scene.bit_words = baked.line_spaces.words.data();

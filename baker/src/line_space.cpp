@@ -16,62 +16,6 @@ namespace {
 
 glm::vec3 vec(const lsp_float3& v) { return {v.x, v.y, v.z}; }
 lsp_float3 f3(const glm::vec3& v) { return {v.x, v.y, v.z}; }
-bool is_leaf(uint32_t child) { return (child & LSP_LEAF_BIT) != 0; }
-
-// Walks the tree depth first and picks the sites.
-class Chooser {
- public:
-  Chooser(const Bvh& bvh, const LineSpaceOptions& options) : bvh_(bvh), options_(options) {
-    last_depth_ = *std::max_element(options.depths.begin(), options.depths.end());
-  }
-
-  // Returns the subtree's records as [first, end).
-  std::pair<uint32_t, uint32_t> visit(uint32_t child, const lsp_float3& lo, const lsp_float3& hi,
-                                      uint32_t depth, bool covered) {
-    const uint32_t count = count_records(child);
-    const bool small = !covered && depth <= last_depth_ && count < options_.triangles;
-    const bool at_depth = !is_leaf(child) && std::find(options_.depths.begin(), options_.depths.end(),
-                                                       depth) != options_.depths.end();
-    size_t site = SIZE_MAX;
-    if ((small || at_depth) && !covered) {
-      site = sites.size();
-      sites.push_back({child, lo, hi, 0, count, true});
-    }
-    std::pair<uint32_t, uint32_t> range;
-    if (is_leaf(child)) {
-      const uint32_t first = child & LSP_LEAF_FIRST_MASK;
-      range = {first, first + count};
-    } else {
-      const LspNode& node = bvh_.nodes[child];
-      const bool stop = covered || small || depth >= last_depth_;
-      range.first = visit(node.child0, node.lo0, node.hi0, depth + 1, stop).first;
-      range.second = visit(node.child1, node.lo1, node.hi1, depth + 1, stop).second;
-    }
-    if (site != SIZE_MAX) {
-      sites[site].triangle_first = range.first;
-      sites[site].terminal = sites.size() == site + 1;
-    }
-    return range;
-  }
-
-  std::vector<LineSpaceSite> sites;
-
- private:
-  // Records of a subtree: those of its last leaf's end less its first leaf's start.
-  uint32_t count_records(uint32_t child) const {
-    uint32_t first = child, last = child;
-    while (!is_leaf(first)) first = bvh_.nodes[first].child0;
-    while (!is_leaf(last)) last = bvh_.nodes[last].child1;
-    const uint32_t end =
-        (last & LSP_LEAF_FIRST_MASK) + ((last >> LSP_LEAF_COUNT_SHIFT) & LSP_LEAF_COUNT_MASK) + 1;
-    return end - (first & LSP_LEAF_FIRST_MASK);
-  }
-
-  const Bvh& bvh_;
-  const LineSpaceOptions& options_;
-  uint32_t last_depth_;
-};
-
 constexpr uint32_t kFirstSamples = 3;
 constexpr float kSettled = 0.01f;  // mean error, in lengths of the shaft, under which a plane is good enough
 
@@ -122,10 +66,11 @@ class Filler {
   Filler(const Bvh& bvh, const LspHeader& header, std::span<const LspTriangle> triangles,
          const LineSpaceSite& site, const LineSpaceOptions& options)
       : header_(header), options_(options), site_(site) {
-    header_.root = site.child;
+    header_.base_structure = LSP_BASE_BVH;
+    header_.root = site.subtree;
     header_.root_line_space = LSP_NONE;
-    header_.bounds_min = site.lo;
-    header_.bounds_max = site.hi;
+    header_.bounds_min = site.subtree_lo;
+    header_.bounds_max = site.subtree_hi;
     header_.required_features = LSP_FEATURE_EXACT;
     header_.node_count = uint32_t(bvh.nodes.size());
     header_.triangle_count = uint32_t(triangles.size());
@@ -234,10 +179,14 @@ class Filler {
     const uint32_t shafts = uint32_t(hit.size());
     const uint32_t filled = uint32_t(shafts - size_t(std::count(hit.begin(), hit.end(), LSP_NONE)));
     const bool binary = options_.kind == LineSpaceKind::kBinary;
-    const uint32_t bytes = binary                          ? 0
-                           : site_.triangle_count < 0xFF   ? 1
-                           : site_.triangle_count < 0xFFFF ? 2
-                                                           : 4;
+    uint32_t first = site_.triangle_first, count = site_.triangle_count;
+    if (count == 0 && filled > 0) {
+      first = *std::min_element(hit.begin(), hit.end());
+      uint32_t last = first;
+      for (uint32_t t : hit) last = t == LSP_NONE ? last : std::max(last, t);
+      count = last - first + 1;
+    }
+    const uint32_t bytes = binary ? 0 : count < 0xFF ? 1 : count < 0xFFFF ? 2 : 4;
     const uint32_t word_count = (shafts + 31) / 32;
     // Section 3.1: the sparse layout costs two words per 32 shafts, the dense one an entry per empty shaft.
     const bool dense = !binary && uint64_t(shafts) * bytes <
@@ -250,11 +199,11 @@ class Filler {
                      f3(hi_),
                      0,
                      f3(scale),
-                     site_.triangle_first,
+                     first,
                      n | bytes << LSP_FORMAT_ENTRY_SHIFT | (dense ? LSP_FORMAT_DENSE : 0) |
                          (binary ? LSP_FORMAT_SYMMETRIC : 0),
                      filled,
-                     site_.triangle_count,
+                     count,
                      site_.child};
     if (!dense) {
       result.words.resize(word_count);
@@ -275,7 +224,7 @@ class Filler {
       for (uint32_t s = 0; s < shafts; ++s) {
         if (hit[s] == LSP_NONE && !dense) continue;
         const uint32_t mask = bytes == 4 ? LSP_NONE : (1u << bytes * 8) - 1;
-        const uint32_t value = hit[s] == LSP_NONE ? mask : hit[s] - site_.triangle_first;
+        const uint32_t value = hit[s] == LSP_NONE ? mask : hit[s] - first;
         result.candidates[entry / per_word] |= value << (entry % per_word) * bytes * 8;
         ++entry;
       }
@@ -294,17 +243,9 @@ class Filler {
 
 }  // namespace
 
-std::vector<LineSpaceSite> choose_sites(const Bvh& bvh, const LspHeader& header,
-                                        const LineSpaceOptions& options) {
-  if (bvh.root == LSP_NONE || options.depths.empty()) return {};
-  Chooser chooser(bvh, options);
-  chooser.visit(bvh.root, header.bounds_min, header.bounds_max, 0, false);
-  return std::move(chooser.sites);
-}
-
-LineSpaces fill_line_spaces(Bvh& bvh, RootReference& root, const LspHeader& header,
-                            std::span<const LspTriangle> triangles, const std::vector<LineSpaceSite>& sites,
-                            const LineSpaceOptions& options, const std::function<void(double)>& progress) {
+LineSpaces fill_line_spaces(const Bvh& bvh, const LspHeader& header, std::span<const LspTriangle> triangles,
+                            const std::vector<LineSpaceSite>& sites, const LineSpaceOptions& options,
+                            std::vector<uint32_t>& references, const std::function<void(double)>& progress) {
   // The tracer answers with primitives; here it is to answer with records.
   std::vector<LspTriangle> numbered(triangles.begin(), triangles.end());
   for (size_t i = 0; i < numbered.size(); ++i) numbered[i].primitive = uint32_t(i);
@@ -320,8 +261,7 @@ LineSpaces fill_line_spaces(Bvh& bvh, RootReference& root, const LspHeader& head
   LineSpaces all;
   const uint32_t n = options.resolution;
   const uint64_t shafts = (options.kind == LineSpaceKind::kBinary ? 15ull : 30ull) * n * n * n * n;
-  // References by child: a child reference names its node or leaf uniquely.
-  std::vector<std::pair<uint32_t, uint32_t>> references;
+  references.assign(sites.size(), LSP_NONE);
   for (size_t i = 0; i < sites.size(); ++i) {
     Filled& f = filled[i];
     if (f.record.filled == 0) {
@@ -339,21 +279,14 @@ LineSpaces fill_line_spaces(Bvh& bvh, RootReference& root, const LspHeader& head
     all.shafts += shafts;
     all.filled += f.record.filled;
     all.dense += (f.record.format & LSP_FORMAT_DENSE) ? 1 : 0;
-    references.emplace_back(sites[i].child,
-                            uint32_t(all.records.size()) | (sites[i].terminal ? LSP_TERMINAL_BIT : 0));
+    references[i] = uint32_t(all.records.size()) | LSP_TERMINAL_BIT;
     all.records.push_back(f.record);
     f = {};
   }
-  std::sort(references.begin(), references.end());
-  const auto reference_of = [&](uint32_t child) {
-    const auto it = std::lower_bound(references.begin(), references.end(), std::pair(child, 0u));
-    return it != references.end() && it->first == child ? it->second : LSP_NONE;
-  };
-  root.line_space = reference_of(bvh.root);
-  for (LspNode& node : bvh.nodes) {
-    node.line_space0 = reference_of(node.child0);
-    node.line_space1 = reference_of(node.child1);
-  }
+  for (size_t i = 0; i < sites.size(); ++i)
+    if (references[i] != LSP_NONE)
+      for (size_t above = sites[i].parent; above != kNoSite; above = sites[above].parent)
+        if (references[above] != LSP_NONE) references[above] &= ~LSP_TERMINAL_BIT;
   return all;
 }
 

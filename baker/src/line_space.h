@@ -29,13 +29,21 @@ struct LineSpaceOptions {
   uint32_t triangles = 0;  // T: so does a node above the last depth with fewer triangles than this
 };
 
-// A node that carries a Line Space.
+constexpr size_t kNoSite = SIZE_MAX;
+constexpr uint32_t kNoCell = LSP_NONE;
+
+// A node that is to carry a Line Space.
 struct LineSpaceSite {
-  uint32_t child;           // its child reference
-  lsp_float3 lo, hi;        // its box
-  uint32_t triangle_first;  // its subtree's records
-  uint32_t triangle_count;
-  bool terminal;  // no site below
+  uint32_t child;     // its child reference
+  lsp_float3 lo, hi;  // its box
+  // The BVH that knows what is inside: for a node of the BVH its own subtree, for one of an NTree a subtree
+  // of a BVH of the same triangles, with its box.
+  uint32_t subtree;
+  lsp_float3 subtree_lo, subtree_hi;
+  // The records that its candidates are numbered within; none: from the first candidate to the last.
+  uint32_t triangle_first, triangle_count;
+  size_t parent = kNoSite;  // index of the next site above
+  uint32_t cell = kNoCell;  // of the NTree
 };
 
 struct LineSpaces {
@@ -48,21 +56,13 @@ struct LineSpaces {
   uint64_t dropped = 0;  // sites whose Line Space had no filled shaft
 };
 
-// The root's Line Space reference, set by attach_line_spaces; the other nodes' are in bvh.nodes.
-struct RootReference {
-  uint32_t line_space = LSP_NONE;
-};
-
-// The nodes of `bvh` that are to carry a Line Space, in depth-first order.
-std::vector<LineSpaceSite> choose_sites(const Bvh& bvh, const LspHeader& header,
-                                        const LineSpaceOptions& options);
-
-// Computes the Line Space of every site on all threads of the current oneTBB arena and writes the references
-// into `bvh.nodes` and `root`. `triangles` are the tree's records. The result does not depend on the number
-// of threads. `progress` is called with the share done, from any thread.
-LineSpaces fill_line_spaces(Bvh& bvh, RootReference& root, const LspHeader& header,
-                            std::span<const LspTriangle> triangles, const std::vector<LineSpaceSite>& sites,
-                            const LineSpaceOptions& options,
+// Computes the Line Space of every site on all threads of the current oneTBB arena, by tracing through `bvh`,
+// whose records are `triangles`. `references` becomes, per site, its Line Space reference, LSP_NONE when no
+// shaft was filled. The result does not depend on the number of threads. `progress` is called with the share
+// done, from any thread.
+LineSpaces fill_line_spaces(const Bvh& bvh, const LspHeader& header, std::span<const LspTriangle> triangles,
+                            const std::vector<LineSpaceSite>& sites, const LineSpaceOptions& options,
+                            std::vector<uint32_t>& references,
                             const std::function<void(double)>& progress = {});
 
 }  // namespace lsp

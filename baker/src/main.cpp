@@ -22,10 +22,14 @@ namespace {
 using namespace lsp;
 using Json = nlohmann::ordered_json;
 
+constexpr uint32_t kNTreeLevels = 3;
+
 struct Arguments {
   std::vector<std::filesystem::path> inputs;
   std::filesystem::path output;
   std::string base = "bvh";
+  uint32_t branching = 0;  // 0: the resolution
+  uint32_t levels = kNTreeLevels;
   uint32_t resolution = 6;
   std::vector<uint32_t> depths = {9};
   uint32_t triangles = 0;
@@ -106,6 +110,8 @@ Json provenance(const Arguments& a, const Mesh& mesh, const std::array<uint64_t,
           {"source_hash", hex128(source[0], source[1])},
           {"options",
            {{"base", a.base},
+            {"branching", a.branching},
+            {"levels", a.base == "ntree" ? a.levels : 0},
             {"resolution", a.resolution},
             {"depth", a.depths},
             {"triangles", a.triangles},
@@ -129,17 +135,20 @@ Json provenance(const Arguments& a, const Mesh& mesh, const std::array<uint64_t,
 
 Exit run(Arguments a) {
   if (a.exact && a.no_exact) throw Failure(Exit::kUsage, "", "--exact and --no-exact exclude each other");
-  if (a.base == "ntree")
-    throw Failure(Exit::kUnsupported, "",
-                  "the base structure ntree is not built by this version, use --base bvh");
   if (a.max_error > 0 && (a.resolution_given || a.depth_given || a.samples_given))
     throw Failure(Exit::kUsage, "",
                   "--max-error chooses --resolution, --depth and --samples itself, leave them out");
   if (a.max_error > 0 && (a.no_line_spaces || a.purpose == Purpose::kVisibility))
     throw Failure(Exit::kUsage, "", "--max-error needs Line Spaces with candidates");
   const Quality& preset = kPresets.at(a.preset);
+  const bool ntree = a.base == "ntree";
+  if (!ntree && (a.branching || a.levels != kNTreeLevels))
+    throw Failure(Exit::kUsage, "", "--branching and --levels need --base ntree");
+  if (ntree && a.max_error > 0)
+    throw Failure(Exit::kUsage, "", "--max-error chooses among BVHs, leave out --base");
   if (!a.resolution_given) a.resolution = preset.resolution;
-  if (!a.depth_given) a.depths = {preset.depth};
+  if (ntree && !a.branching) a.branching = std::clamp(a.resolution, 2u, LSP_MAX_BRANCHING);
+  if (!a.depth_given) a.depths = {ntree ? a.levels - 1 : preset.depth};
   if (!a.samples_given) a.samples = preset.samples;
   if (a.no_line_spaces && a.no_exact)
     throw Failure(Exit::kUsage, "", "--no-line-spaces with --no-exact leaves nothing to trace");
@@ -166,6 +175,9 @@ Exit run(Arguments a) {
   BakeOptions options;
   options.purpose = a.purpose;
   options.line_spaces = !a.no_line_spaces;
+  options.base = ntree ? Base::kNTree : Base::kBvh;
+  options.ntree.branching = a.branching;
+  options.ntree.levels = a.levels;
   options.bvh.spatial_splits = !a.no_splits;
   options.line_space.triangles = a.triangles;
   options.line_space.kind =
@@ -288,6 +300,9 @@ int main(int argc, char** argv) {
   app.add_option("INPUT", a.inputs, "Mesh files, read in this order")->required();
   app.add_option("-o,--output", a.output, "The .lsp file to write")->required();
   app.add_option("--base", a.base, "Base structure")->check(CLI::IsMember({"bvh", "ntree"}));
+  app.add_option("--branching", a.branching, "NTree: cells along an edge of a node; 0: as --resolution")
+      ->check(CLI::IsMember({0}) | CLI::Range(2u, LSP_MAX_BRANCHING));
+  app.add_option("--levels", a.levels, "NTree: levels of nodes")->check(CLI::Range(1u, LSP_MAX_NTREE_DEPTH));
   app.add_option("--preset", a.preset,
                  "Speed against accuracy, where --resolution, --depth or --samples do not say")
       ->check(CLI::IsMember({"fast", "balanced", "accurate"}));

@@ -127,6 +127,9 @@ Written write_lsp(const std::filesystem::path& path, Baked& baked, const std::st
   add_vector("LSPC", LSP_SECTION_LSPC, true, baked.line_spaces.records);
   add_vector("BITS", LSP_SECTION_BITS, true, baked.line_spaces.words);
   add_vector("CAND", LSP_SECTION_CAND, true, baked.line_spaces.candidates);
+  add_vector("GRID", LSP_SECTION_GRID, true, baked.ntree.grid);
+  add_vector("CELL", LSP_SECTION_CELL, true, baked.ntree.cells);
+  add_vector("REFS", LSP_SECTION_REFS, true, baked.ntree.references);
   add("META", LSP_SECTION_META, 1, false, meta.data(), meta.size());
 
   bool any_packed = false;

@@ -18,10 +18,17 @@ struct KnownType {
   uint32_t element_bytes;
 };
 constexpr KnownType kKnown[kKnownSectionCount] = {
-    {LSP_SECTION_NODE, sizeof(LspNode)},          {LSP_SECTION_TRIA, sizeof(LspTriangle)},
-    {LSP_SECTION_NRML, sizeof(LspCornerNormals)}, {LSP_SECTION_MATL, sizeof(LspMaterial)},
-    {LSP_SECTION_LSPC, sizeof(LspLineSpace)},     {LSP_SECTION_BITS, sizeof(LspBitWord)},
-    {LSP_SECTION_CAND, sizeof(uint32_t)},         {LSP_SECTION_META, 1},
+    {LSP_SECTION_NODE, sizeof(LspNode)},
+    {LSP_SECTION_TRIA, sizeof(LspTriangle)},
+    {LSP_SECTION_NRML, sizeof(LspCornerNormals)},
+    {LSP_SECTION_MATL, sizeof(LspMaterial)},
+    {LSP_SECTION_LSPC, sizeof(LspLineSpace)},
+    {LSP_SECTION_BITS, sizeof(LspBitWord)},
+    {LSP_SECTION_CAND, sizeof(uint32_t)},
+    {LSP_SECTION_GRID, sizeof(LspBitWord)},
+    {LSP_SECTION_CELL, sizeof(LspCell)},
+    {LSP_SECTION_REFS, sizeof(uint32_t)},
+    {LSP_SECTION_META, 1},
 };
 
 constexpr uint64_t kPackedAlignment = 256;
@@ -34,6 +41,14 @@ int known_index(uint32_t type) {
     if (kKnown[i].type == type) return i;
   }
   return -1;
+}
+
+bool is_ntree(const LspHeader& header) { return header.base_structure == LSP_BASE_NTREE; }
+
+// What a traversal of an NTree visits at most: of every node the cells along a line and the way out of it, or
+// all filled cells (lsp/ntree.h), and every reference.
+uint64_t ntree_steps(const LspHeader& header) {
+  return 3ull * header.ntree_branching * header.node_count + header.cell_count + header.reference_count;
 }
 
 bool finite(const lsp_float3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
@@ -59,6 +74,22 @@ lsp_status check_identity(const LspHeader& header, lsp_error* error) {
   return LSP_OK;
 }
 
+lsp_status check_ntree(const LspHeader& header, lsp_error* error) {
+  bool good = header.ntree_branching == 0 && header.ntree_depth == 0 && header.cell_count == 0 &&
+              header.reference_count == 0;
+  if (is_ntree(header)) {
+    good = header.ntree_branching >= 2 && header.ntree_branching <= LSP_MAX_BRANCHING &&
+           header.ntree_depth >= 1 && header.ntree_depth <= LSP_MAX_NTREE_DEPTH && finite(header.ntree_lo) &&
+           header.ntree_size > 0 && std::isfinite(header.ntree_size) && header.ntree_margin >= 0 &&
+           std::isfinite(header.ntree_margin) && header.reference_count < LSP_LEAF_BIT &&
+           uint64_t{header.node_count} * LSP_GRID_WORDS(header.ntree_branching) <= LSP_NONE;
+  }
+  if (good) return LSP_OK;
+  return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, ntree_branching),
+              "states an NTree of branching %u and depth %u that does not fit base structure %u",
+              header.ntree_branching, header.ntree_depth, header.base_structure);
+}
+
 lsp_status check_limits(const LspHeader& header, lsp_error* error) {
   if (!std::has_single_bit(header.alignment) || header.alignment < kPackedAlignment ||
       header.alignment > kMaxAlignment) {
@@ -79,14 +110,16 @@ lsp_status check_limits(const LspHeader& header, lsp_error* error) {
     return fail(error, LSP_ERROR_LIMIT, offsetof(LspHeader, max_stack),
                 "needs a stack of %u entries, the limit is %u", header.max_stack, LSP_MAX_STACK);
   }
+  if (const lsp_status status = check_ntree(header, error); status != LSP_OK) return status;
   // Every node and leaf is visited once at most, so a loop bounded by this ends soon even where nodes form a
   // ring.
-  if (header.max_steps > 2 * uint64_t{header.node_count} + kStepsSlack) {
+  const uint64_t steps = is_ntree(header) ? ntree_steps(header) : 2 * uint64_t{header.node_count};
+  if (header.max_steps > steps + kStepsSlack) {
     return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, max_steps),
                 "states %u steps of traversal, more than its %u nodes have children", header.max_steps,
                 header.node_count);
   }
-  if (header.max_leaf_triangles > LSP_MAX_LEAF_TRIANGLES) {
+  if (!is_ntree(header) && header.max_leaf_triangles > LSP_MAX_LEAF_TRIANGLES) {
     return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, max_leaf_triangles),
                 "states leaves of %u triangles, the limit is %u", header.max_leaf_triangles,
                 LSP_MAX_LEAF_TRIANGLES);
@@ -103,7 +136,9 @@ lsp_status check_root(const LspHeader& header, lsp_error* error) {
   const uint32_t root = header.root;
   bool good = root == LSP_NONE;
   if (root != LSP_NONE && (root & LSP_LEAF_BIT) == 0) good = root < header.node_count;
-  if (root != LSP_NONE && (root & LSP_LEAF_BIT) != 0) {
+  if (is_ntree(header)) {
+    good = root == LSP_NONE || (root == 0 && header.node_count > 0);
+  } else if (root != LSP_NONE && (root & LSP_LEAF_BIT) != 0) {
     const uint32_t count = ((root >> LSP_LEAF_COUNT_SHIFT) & LSP_LEAF_COUNT_MASK) + 1;
     good = in_range(root & LSP_LEAF_FIRST_MASK, count, header.triangle_count);
   }
@@ -190,10 +225,14 @@ lsp_status check_contents(const Container& container, lsp_error* error) {
   const uint32_t features = header.required_features;
   const struct {
     KnownSection section;
-    uint32_t count;
+    uint64_t count;
     uint32_t feature;  // the bit that stands for the section, 0: none
   } expected[] = {
-      {kNode, header.node_count, 0},
+      {kNode, is_ntree(header) ? 0 : header.node_count, 0},
+      {kGrid, is_ntree(header) ? uint64_t{header.node_count} * LSP_GRID_WORDS(header.ntree_branching) : 0,
+       LSP_FEATURE_NTREE},
+      {kCell, header.cell_count, LSP_FEATURE_NTREE},
+      {kRefs, header.reference_count, LSP_FEATURE_NTREE},
       {kTria, header.triangle_count, 0},
       {kNrml, (features & LSP_FEATURE_NORMALS) != 0 ? header.triangle_count : 0, LSP_FEATURE_NORMALS},
       {kMatl, header.material_count, LSP_FEATURE_MATERIALS},
@@ -207,8 +246,8 @@ lsp_status check_contents(const Container& container, lsp_error* error) {
     const uint64_t present = section == nullptr ? 0 : section->element_count;
     if (present != e.count) {
       return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, node_count),
-                  "section %s has %llu elements, the header states %u", name.text,
-                  static_cast<unsigned long long>(present), e.count);
+                  "section %s has %llu elements, the header states %llu", name.text,
+                  static_cast<unsigned long long>(present), static_cast<unsigned long long>(e.count));
     }
     if (e.feature != 0 && e.count != 0 && (features & e.feature) == 0) {
       return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, required_features),

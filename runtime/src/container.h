@@ -6,7 +6,7 @@
 namespace lsp {
 
 // The sections this version knows, in the order of the file.
-enum KnownSection { kNode, kTria, kNrml, kMatl, kLspc, kBits, kCand, kMeta, kKnownSectionCount };
+enum KnownSection { kNode, kTria, kNrml, kMatl, kLspc, kBits, kCand, kGrid, kCell, kRefs, kMeta, kKnownSectionCount };
 
 // A checked view of header and section table; pointers into the file's bytes.
 struct Container {

@@ -34,5 +34,8 @@ extern "C" lsp_status lsp_open(const void* bytes, uint64_t size, lsp_scene* scen
   scene->line_spaces = array<LspLineSpace>(bytes, container.known[lsp::kLspc]);
   scene->bit_words = array<LspBitWord>(bytes, container.known[lsp::kBits]);
   scene->candidates = array<uint32_t>(bytes, container.known[lsp::kCand]);
+  scene->grid = array<LspBitWord>(bytes, container.known[lsp::kGrid]);
+  scene->cells = array<LspCell>(bytes, container.known[lsp::kCell]);
+  scene->references = array<uint32_t>(bytes, container.known[lsp::kRefs]);
   return lsp::succeed(error);
 }

@@ -12,6 +12,7 @@
 namespace lsp::subset {
 
 using glm::vec2;
+using glm::ivec3;
 using glm::vec3;
 using uint = uint32_t;
 
@@ -19,6 +20,7 @@ inline vec3 load3(const lsp_float3& v) { return {v.x, v.y, v.z}; }
 inline lsp_float3 store3(const vec3& v) { return {v.x, v.y, v.z}; }
 inline uint floatBitsToUint(float x) { return std::bit_cast<uint>(x); }
 inline float uintBitsToFloat(uint x) { return std::bit_cast<float>(x); }
+inline int findLSB(uint x) { return x == 0 ? -1 : std::countr_zero(x); }
 inline int bitCount(uint x) { return std::popcount(x); }
 inline float abs(float x) { return std::fabs(x); }
 inline vec3 abs(const vec3& v) { return {std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)}; }
@@ -52,5 +54,8 @@ inline const T& at(const T* array, uint index, uint count) {
 #define LSP_LINE_SPACE(i) at(scene.line_spaces, i, scene.header->line_space_count)
 #define LSP_BIT_WORD(i) at(scene.bit_words, i, scene.header->bit_word_count)
 #define LSP_CANDIDATE(i) at(scene.candidates, i, scene.header->candidate_word_count)
+#define LSP_GRID(i) at(scene.grid, i, scene.header->node_count * LSP_GRID_WORDS(scene.header->ntree_branching))
+#define LSP_CELL(i) at(scene.cells, i, scene.header->cell_count)
+#define LSP_REFERENCE(i) at(scene.references, i, scene.header->reference_count)
 #define LSP_HAS_NORMALS (scene.normals != nullptr)
 #define LSP_STACK_SIZE LSP_MAX_STACK

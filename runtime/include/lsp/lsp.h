@@ -66,6 +66,9 @@ typedef struct lsp_scene {
   const LspLineSpace* line_spaces;
   const LspBitWord* bit_words;
   const uint32_t* candidates;
+  const LspBitWord* grid; /* of an NTree, as the next two; nodes is NULL then */
+  const LspCell* cells;
+  const uint32_t* references;
 } lsp_scene;
 
 /* Opens the raw (not packed) file in bytes[0, size). `bytes` must be 16-byte aligned and outlive `scene`.
@@ -116,7 +119,7 @@ typedef struct lsp_trace_counts {
   uint64_t rays;
   uint64_t invalid; /* rays with a non-finite component, a zero direction or tmin > tmax: misses */
   uint64_t hits;
-  uint64_t nodes;     /* LspNode visited (two boxes each) */
+  uint64_t nodes;     /* LspNode visited (two boxes each); NTree: cells stepped through, empty ones too */
   uint64_t shafts;    /* Line Space look-ups */
   uint64_t triangles; /* triangles tested exactly */
 } lsp_trace_counts;

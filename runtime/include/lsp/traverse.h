@@ -1,4 +1,5 @@
-/* Exact and approximate traversal of an .lsp scene, in the common subset of GLSL 4.6 and C++20.
+/* Exact and approximate traversal of an .lsp scene, in the common subset of GLSL 4.6 and C++20: of a BVH, or
+ * with LSP_NTREE defined of an NTree.
  *
  * lsp.glsl includes this file in shaders, runtime/src/trace.cpp in the library: one text, so that both give
  * the same bits. That holds where the compiler contracts nothing (LSP_PRECISE, -ffp-contract=off), rounds
@@ -61,6 +62,7 @@ struct LspSetup {
   vec3 inverse;      /* 1 / direction; +-2^80 for components too small to matter */
   vec3 origin_plus;  /* origin + err: boxes are grown by moving the origin */
   vec3 origin_minus; /* origin - err */
+  float err;         /* see the top of this file */
   vec3 shear;        /* of the triangle test, in the order of `axis` */
   float speed;       /* length of direction */
   float tmin;
@@ -140,6 +142,7 @@ LSP_FN bool lsp_setup(LSP_SCENE_ LspRay ray, LSP_OUT(LspSetup) s) {
   float r = lsp_max(lsp_max(lsp_max(lo.x, hi.x), lsp_max(lo.y, hi.y)), lsp_max(lo.z, hi.z));
   float a = lsp_max(lsp_max(abs(o.x), abs(o.y)), abs(o.z));
   LSP_PRECISE float err = r * 9.5367432e-7f + a * 2.3841858e-7f; /* 16 u r + 4 u a */
+  s.err = err;
   s.origin_plus = vec3(o.x + err, o.y + err, o.z + err);
   s.origin_minus = vec3(o.x - err, o.y - err, o.z - err);
 
@@ -161,6 +164,54 @@ LSP_FN float lsp_box(LSP_IN(LspSetup) s, vec3 lo, vec3 hi, float tmax) {
   return t_in <= t_out ? t_in : LSP_INFINITY;
 }
 
+/* Where the ray leaves the grown box, if it hits it. */
+LSP_FN float lsp_box_exit(LSP_IN(LspSetup) s, vec3 lo, vec3 hi) {
+  LSP_PRECISE vec3 a = (lo - s.origin_plus) * s.inverse;
+  LSP_PRECISE vec3 b = (hi - s.origin_minus) * s.inverse;
+  return lsp_min(lsp_min(lsp_max(a.x, b.x), lsp_max(a.y, b.y)), lsp_max(a.z, b.z));
+}
+
+LSP_FN float lsp_largest(vec3 v) {
+  vec3 m = abs(v);
+  return lsp_max(lsp_max(m.x, m.y), m.z);
+}
+
+/* Where the ray meets the plane of a triangle that it passes: a, b, c are the corners seen from the origin,
+ * the ray's axis last. The corners' own depths averaged by the edge functions would be an error of 5 u R over
+ * the smallest height of the triangle off, however near the hit; the plane is off by what the normal is. That
+ * is best at the corner opposite the longest edge: of a needle the other two give a difference of large
+ * products. No hit lies outside the depths of the corners, so what a needle can err is bounded by its own
+ * extent. Edges are scaled by a power of two (exact): products of three small lengths would underflow. */
+LSP_FN float lsp_plane_depth(LSP_IN(LspSetup) s, vec3 a, vec3 b, vec3 c) {
+  LSP_PRECISE vec3 ab = b - a;
+  LSP_PRECISE vec3 bc = c - b;
+  LSP_PRECISE vec3 ca = a - c;
+  float length_ab = lsp_largest(ab);
+  float length_bc = lsp_largest(bc);
+  float length_ca = lsp_largest(ca);
+  vec3 p = c; /* the longest is ab */
+  vec3 e = ca;
+  vec3 f = bc;
+  if (length_bc >= length_ab && length_bc >= length_ca) {
+    p = a;
+    e = ab;
+    f = ca;
+  } else if (length_ca >= length_ab) {
+    p = b;
+    e = bc;
+    f = ab;
+  }
+  uint exponent = floatBitsToUint(lsp_max(lsp_max(length_ab, length_bc), length_ca)) >> 23u;
+  exponent = exponent < 1u ? 1u : (exponent > 253u ? 253u : exponent);
+  float shrink = uintBitsToFloat((254u - exponent) << 23u);
+  vec3 n = lsp_cross(e * shrink, f * shrink);
+  LSP_PRECISE float t = lsp_dot(n, p) / lsp_dot(n, lsp_rotate(s.direction, s.axis));
+  LSP_PRECISE vec3 z = vec3(a.z, b.z, c.z) * s.shear.z;
+  /* In this order a NaN, of a triangle that the ray lies in, becomes the smallest depth. */
+  t = lsp_max(lsp_min(lsp_min(z.x, z.y), z.z), t);
+  return lsp_min(lsp_max(lsp_max(z.x, z.y), z.z), t);
+}
+
 /* Watertight triangle test (Woop et al. 2013). Keeps a hit nearer than best.t and beyond tmin. */
 LSP_FN void lsp_triangle(LSP_SCENE_ LSP_IN(LspSetup) s, uint index, LSP_INOUT(LspBest) best) {
   LspTriangle tri = LSP_TRIANGLE(index);
@@ -178,10 +229,10 @@ LSP_FN void lsp_triangle(LSP_SCENE_ LSP_IN(LspSetup) s, uint index, LSP_INOUT(Ls
   LSP_PRECISE float w = bx * ay - by * ax;
   if ((u < 0.0f || v < 0.0f || w < 0.0f) && (u > 0.0f || v > 0.0f || w > 0.0f)) return;
   LSP_PRECISE float det = u + v + w;
-  if (det == 0.0f) return;
-  LSP_PRECISE float rcp = 1.0f / det;
-  LSP_PRECISE float t = (u * a.z + v * b.z + w * c.z) * s.shear.z * rcp;
+  if (det == 0.0f || !lsp_is_finite(det)) return;
+  float t = lsp_plane_depth(s, a, b, c);
   if (t > s.tmin && t < best.t) {
+    LSP_PRECISE float rcp = 1.0f / det;
     best.t = t;
     best.u = v * rcp;
     best.v = w * rcp;
@@ -491,6 +542,10 @@ LSP_FN LspBest lsp_traverse(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod
   return best;
 }
 
+#ifdef LSP_NTREE
+#include "lsp/ntree.h"
+#endif
+
 LSP_FN LspHit lsp_no_hit() {
   LspHit hit;
   hit.t = LSP_INFINITY;
@@ -539,7 +594,11 @@ LSP_FN LspHit lsp_trace_ray(LSP_SCENE_ LspRay ray, uint flags, float lod, LSP_OU
   LspSetup s;
   valid = lsp_setup(LSP_SCENE_ARG_ ray, s);
   if (!valid) return lsp_no_hit();
+#ifdef LSP_NTREE
+  LspBest best = lsp_traverse_ntree(LSP_SCENE_ARG_ s, flags, lod LSP_COUNTS_ARG);
+#else
   LspBest best = lsp_traverse(LSP_SCENE_ARG_ s, flags, lod, LSP_HEADER.root, LSP_HEADER.root_line_space LSP_COUNTS_ARG);
+#endif
   return lsp_finish(LSP_SCENE_ARG_ s, ray, best);
 }
 

@@ -1,0 +1,198 @@
+/* Traversal of an NTree, in the common subset of GLSL 4.6 and C++20; lsp/traverse.h includes it where LSP_NTREE
+ * is defined. Layout: LspCell in layout.h.
+ *
+ * A three-dimensional digital differential analyser in every node (Amanatides, Woo, "A Fast Voxel Traversal
+ * Algorithm for Ray Tracing", 1987) that computes the next planes from the cell's integer coordinates, not by
+ * adding steps: errors do not add up, and neighbours agree on the plane between them to the bit.
+ *
+ * No gaps at borders. The cells visited cover the ray up to the rounding of the planes, of the t at which they are
+ * crossed, and of the point at which a child node is entered: an error along the axes of at most
+ * err = 16 u R + 4 u max|o| (lsp/traverse.h). Where a corner is cut, the cell passed over touches two visited ones
+ * in a sliver narrower than err. A cell holds every triangle within ntree_margin of it; while err <= ntree_margin
+ * that is the sliver's triangles too. A ray from further away visits all filled cells whose box, grown by err, it
+ * hits, in the order of storage.
+ */
+#ifndef LSP_NTREE_H
+#define LSP_NTREE_H
+
+LSP_FN vec3 lsp_ntree_lo(LSP_SCENE_ ivec3 cell, float size) {
+  LSP_PRECISE vec3 lo = LSP_LOAD3(LSP_HEADER.ntree_lo) + vec3(cell) * size;
+  return lo;
+}
+
+/* Where the ray crosses the far planes of a cell, per axis. */
+LSP_FN vec3 lsp_ntree_next(LSP_SCENE_ LSP_IN(LspSetup) s, ivec3 cell, ivec3 ahead, float size) {
+  vec3 plane = lsp_ntree_lo(LSP_SCENE_ARG_ cell + ahead, size);
+  LSP_PRECISE vec3 t = (plane - s.origin) * s.inverse;
+  return t;
+}
+
+/* The cell of the node that begins at `base` in which the ray is at t. */
+LSP_FN ivec3 lsp_ntree_enter(LSP_SCENE_ LSP_IN(LspSetup) s, ivec3 base, float size, float t) {
+  vec3 corner = lsp_ntree_lo(LSP_SCENE_ARG_ base, size);
+  LSP_PRECISE vec3 q = ((s.origin + s.direction * t) - corner) / size;
+  float top = float(LSP_HEADER.ntree_branching) - 0.5f;
+  q.x = q.x > 0.0f ? q.x : 0.0f;
+  q.y = q.y > 0.0f ? q.y : 0.0f;
+  q.z = q.z > 0.0f ? q.z : 0.0f;
+  q.x = q.x < top ? q.x : top;
+  q.y = q.y < top ? q.y : top;
+  q.z = q.z < top ? q.z : top;
+  return base + ivec3(int(q.x), int(q.y), int(q.z));
+}
+
+/* Edge of the cells of a node at `depth`, the root's being 0. */
+LSP_FN float lsp_ntree_cell_size(LSP_SCENE_ uint depth) {
+  uint n = LSP_HEADER.ntree_branching;
+  uint cells = n * (depth > 0u ? n : 1u) * (depth > 1u ? n : 1u) * (depth > 2u ? n : 1u);
+  LSP_PRECISE float size = LSP_HEADER.ntree_size / float(cells);
+  return size;
+}
+
+/* The filled cell of a node after `cell` in the order of storage; n^3 when there is none. */
+LSP_FN uint lsp_ntree_next_filled(LSP_SCENE_ uint first_word, uint cell, uint cells) {
+  uint next = cell + 1u;
+  while (next < cells) {
+    uint bits = LSP_GRID(first_word + (next >> 5u)).bits >> (next & 31u);
+    if (bits != 0u) return next + uint(findLSB(bits));
+    next = (next | 31u) + 1u;
+  }
+  return cells;
+}
+
+/* Traces from the root. flags: LSP_TRACE_*_BIT. */
+LSP_FN LspBest lsp_traverse_ntree(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod LSP_COUNTS_PARAM) {
+  LspBest best;
+  best.t = s.tmax;
+  best.u = 0.0f;
+  best.v = 0.0f;
+  best.triangle = LSP_NONE;
+  best.flags = 0u;
+
+  /* stack[1 + depth]: the node left for its child; stack[0]: see the end of lsp_traverse. */
+  uint stack[LSP_MAX_NTREE_DEPTH + 1u];
+  bool any_hit = (flags & LSP_TRACE_ANY_HIT_BIT) != 0u;
+  int n = int(LSP_HEADER.ntree_branching);
+  uint un = uint(n);
+  uint words = LSP_GRID_WORDS(un);
+  bool far = s.err > LSP_HEADER.ntree_margin;
+  bool gone_x = s.inverse.x < 0.0f;
+  bool gone_y = s.inverse.y < 0.0f;
+  bool gone_z = s.inverse.z < 0.0f;
+  ivec3 ahead = ivec3(gone_x ? 0 : 1, gone_y ? 0 : 1, gone_z ? 0 : 1);
+
+  vec3 bounds_lo = LSP_LOAD3(LSP_HEADER.bounds_min);
+  vec3 bounds_hi = LSP_LOAD3(LSP_HEADER.bounds_max);
+  float t = lsp_box(s, bounds_lo, bounds_hi, best.t);
+  float t_last = lsp_box_exit(s, bounds_lo, bounds_hi);
+  uint ref = LSP_NONE;
+  if (t <= best.t) {
+    vec3 lo = LSP_LOAD3(LSP_HEADER.ntree_lo);
+    vec3 hi = lo + vec3(LSP_HEADER.ntree_size);
+    ref = lsp_visit(LSP_SCENE_ARG_ s, flags, lod, LSP_HEADER.root, LSP_HEADER.root_line_space, lo, hi, t LSP_COUNTS_ARG);
+  }
+  bool done = ref == LSP_NONE;
+  if (!done && (ref & LSP_STACK_LINE_SPACE_BIT) != 0u) {
+    LSP_COUNT_ADD(shafts, 1u);
+    lsp_look_up(LSP_SCENE_ARG_ s, ref & ~LSP_STACK_LINE_SPACE_BIT, best);
+    done = true;
+  }
+  stack[0] = done ? LSP_NONE : 0u;
+
+  uint depth = 0u;
+  uint node = ref;
+  ivec3 base = ivec3(0);
+  float size = lsp_ntree_cell_size(LSP_SCENE_ARG_ 0u);
+  ivec3 cell = far ? base : lsp_ntree_enter(LSP_SCENE_ARG_ s, base, size, t);
+  vec3 next = lsp_ntree_next(LSP_SCENE_ARG_ s, cell, ahead, size);
+  bool visit = true; /* the cell is yet to be looked at */
+
+  for (uint step = 0u; !done && step < LSP_HEADER.max_steps; ++step) {
+    ivec3 local = cell - base;
+    uint index = LSP_CELL_INDEX(uint(local.x), uint(local.y), uint(local.z), un);
+    bool entered = false;
+    if (visit) {
+      LSP_COUNT_ADD(nodes, 1u);
+      LspBitWord word = LSP_GRID(node * words + (index >> 5u));
+      uint bit = index & 31u;
+      if (((word.bits >> bit) & 1u) != 0u) {
+        LspCell record = LSP_CELL(word.offset + uint(bitCount(word.bits & ((1u << bit) - 1u))));
+        ref = record.child;
+        if (far || (record.line_space != LSP_NONE && (flags & LSP_TRACE_APPROXIMATE_BIT) != 0u)) {
+          vec3 lo = lsp_ntree_lo(LSP_SCENE_ARG_ cell, size);
+          vec3 hi = lsp_ntree_lo(LSP_SCENE_ARG_ cell + ivec3(1), size);
+          if (far) {
+            t = lsp_box(s, lo, hi, best.t);
+            if (!(t <= best.t)) ref = LSP_NONE;
+          }
+          if (t <= best.t) ref = lsp_visit(LSP_SCENE_ARG_ s, flags, lod, ref, record.line_space, lo, hi, t LSP_COUNTS_ARG);
+        }
+        if (ref == LSP_NONE) {
+        } else if ((ref & LSP_LEAF_BIT) != 0u) {
+          uint first = ref & ~LSP_LEAF_BIT;
+          uint count = record.count < LSP_HEADER.max_leaf_triangles ? record.count : LSP_HEADER.max_leaf_triangles;
+          LSP_COUNT_ADD(triangles, count);
+          uint i = 0u;
+          for (; i < count; ++i) lsp_triangle(LSP_SCENE_ARG_ s, LSP_REFERENCE(first + i), best);
+          if (i != count) break;
+          step += count;
+        } else if ((ref & LSP_STACK_LINE_SPACE_BIT) != 0u) {
+          LSP_COUNT_ADD(shafts, 1u);
+          lsp_look_up(LSP_SCENE_ARG_ s, ref & ~LSP_STACK_LINE_SPACE_BIT, best);
+        } else if (depth + 1u < LSP_MAX_NTREE_DEPTH) {
+          stack[1u + depth] = node;
+          node = ref;
+          ++depth;
+          base = cell * n;
+          size = lsp_ntree_cell_size(LSP_SCENE_ARG_ depth);
+          cell = far ? base : lsp_ntree_enter(LSP_SCENE_ARG_ s, base, size, t);
+          next = lsp_ntree_next(LSP_SCENE_ARG_ s, cell, ahead, size);
+          entered = true;
+        }
+      }
+    }
+    if (!entered) {
+      /* On to the next cell; out of the node where it has no more. */
+      bool out_of_node;
+      if (far) {
+        index = lsp_ntree_next_filled(LSP_SCENE_ARG_ node * words, index, un * un * un);
+        out_of_node = index == un * un * un;
+        cell = base + ivec3(int(index % un), int(index / un % un), int(index / (un * un)));
+      } else if (next.x <= next.y && next.x <= next.z) {
+        t = lsp_max(t, next.x);
+        cell.x += gone_x ? -1 : 1;
+        out_of_node = uint(cell.x - base.x) >= un;
+        next.x = lsp_ntree_next(LSP_SCENE_ARG_ s, cell, ahead, size).x;
+      } else if (next.y <= next.z) {
+        t = lsp_max(t, next.y);
+        cell.y += gone_y ? -1 : 1;
+        out_of_node = uint(cell.y - base.y) >= un;
+        next.y = lsp_ntree_next(LSP_SCENE_ARG_ s, cell, ahead, size).y;
+      } else {
+        t = lsp_max(t, next.z);
+        cell.z += gone_z ? -1 : 1;
+        out_of_node = uint(cell.z - base.z) >= un;
+        next.z = lsp_ntree_next(LSP_SCENE_ARG_ s, cell, ahead, size).z;
+      }
+      visit = !out_of_node;
+      bool passed = !far && (t > best.t || t > t_last);
+      if ((any_hit && best.triangle != LSP_NONE) || passed || (out_of_node && depth == 0u)) {
+        done = true;
+        stack[0] = LSP_NONE;
+      } else if (out_of_node) {
+        --depth;
+        node = stack[1u + depth];
+        cell = base / n;
+        base = (cell / n) * n;
+        size = lsp_ntree_cell_size(LSP_SCENE_ARG_ depth);
+        next = lsp_ntree_next(LSP_SCENE_ARG_ s, cell, ahead, size);
+      }
+    } else {
+      visit = true;
+    }
+  }
+  best.complete = stack[0] == LSP_NONE;
+  return best;
+}
+
+#endif

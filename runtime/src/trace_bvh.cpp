@@ -1,0 +1,2 @@
+#define LSP_LOOPS kBvhLoops
+#include "trace_loops.inc"
