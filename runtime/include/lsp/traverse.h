@@ -176,31 +176,29 @@ LSP_FN float lsp_largest(vec3 v) {
   return lsp_max(lsp_max(m.x, m.y), m.z);
 }
 
+/* A function that most rays call once or twice: better not inlined into the loop on the CPU. */
+#ifndef LSP_FN_RARE
+#define LSP_FN_RARE LSP_FN
+#endif
+
 /* Where the ray meets the plane of a triangle that it passes: a, b, c are the corners seen from the origin,
  * the ray's axis last. The corners' own depths averaged by the edge functions would be an error of 5 u R over
  * the smallest height of the triangle off, however near the hit; the plane is off by what the normal is. That
  * is best at the corner opposite the longest edge: of a needle the other two give a difference of large
  * products. No hit lies outside the depths of the corners, so what a needle can err is bounded by its own
  * extent. Edges are scaled by a power of two (exact): products of three small lengths would underflow. */
-LSP_FN float lsp_plane_depth(LSP_IN(LspSetup) s, vec3 a, vec3 b, vec3 c) {
+LSP_FN_RARE float lsp_plane_depth(LSP_IN(LspSetup) s, vec3 a, vec3 b, vec3 c) {
   LSP_PRECISE vec3 ab = b - a;
   LSP_PRECISE vec3 bc = c - b;
   LSP_PRECISE vec3 ca = a - c;
   float length_ab = lsp_largest(ab);
   float length_bc = lsp_largest(bc);
   float length_ca = lsp_largest(ca);
-  vec3 p = c; /* the longest is ab */
-  vec3 e = ca;
-  vec3 f = bc;
-  if (length_bc >= length_ab && length_bc >= length_ca) {
-    p = a;
-    e = ab;
-    f = ca;
-  } else if (length_ca >= length_ab) {
-    p = b;
-    e = bc;
-    f = ab;
-  }
+  bool at_a = length_bc >= length_ab && length_bc >= length_ca;
+  bool at_b = length_ca >= length_ab;
+  vec3 p = at_a ? a : (at_b ? b : c);
+  vec3 e = at_a ? ab : (at_b ? bc : ca);
+  vec3 f = at_a ? ca : (at_b ? ab : bc);
   uint exponent = floatBitsToUint(lsp_max(lsp_max(length_ab, length_bc), length_ca)) >> 23u;
   exponent = exponent < 1u ? 1u : (exponent > 253u ? 253u : exponent);
   float shrink = uintBitsToFloat((254u - exponent) << 23u);
