@@ -20,24 +20,33 @@ inline uint32_t bit_count(uint32_t bits) {
   return bits * 0x01010101u >> 24;
 }
 
-// Whether every reference is below `limit`, and how often one is not above that before it.
+// Whether every reference is below the number of triangles, and how often one is not above that before it.
 struct Scan {
   bool in_range = true;
   uint64_t falls = 0;
 };
-Scan scan(std::span<const uint32_t> references, uint32_t limit) {
-  constexpr size_t kBlock = 1 << 16;  // what 32-bit counters hold at ease, for wide vectors
+
+// Marks in `named`, whose size is the number of triangles, what the references name. Block by block, so that
+// the three passes, of which the compiler makes vector code but for the last, read memory once.
+Scan scan(std::span<const uint32_t> references, std::vector<uint8_t>& named) {
+  constexpr size_t kBlock = 4096;
+  const uint32_t limit = static_cast<uint32_t>(named.size());
   Scan result;
-  uint32_t wrong = 0;
   for (size_t first = 0; first < references.size(); first += kBlock) {
-    const size_t end = std::min(references.size(), first + kBlock);
-    uint32_t falls = 0;
-    for (size_t i = first; i < end; ++i) wrong |= references[i] >= limit ? 1u : 0u;
-    for (size_t i = std::max<size_t>(first, 1); i < end; ++i)
-      falls += references[i] <= references[i - 1] ? 1u : 0u;
-    result.falls += falls;
+    const std::span<const uint32_t> block =
+        references.subspan(first, std::min(kBlock, references.size() - first));
+    uint32_t wrong = 0, falls = 0;
+    for (uint32_t reference : block) wrong |= reference >= limit ? 1u : 0u;
+    for (size_t i = 1; i < block.size(); ++i) falls += block[i] <= block[i - 1] ? 1u : 0u;
+    result.falls += falls + (first != 0 && block[0] <= references[first - 1] ? 1u : 0u);
+    if (wrong == 0) {
+      for (uint32_t reference : block) named[reference] = 1;
+    } else {
+      result.in_range = false;
+      for (uint32_t reference : block)
+        if (reference < limit) named[reference] = 1;
+    }
   }
-  result.in_range = wrong == 0;
   return result;
 }
 
@@ -230,16 +239,18 @@ class NtreeCheck {
           view_.length_of(Kind::kRefs, (header_.reference_count - next_reference_) * 4),
           element_path(Kind::kRefs, next_reference_),
           std::to_string(header_.reference_count - next_reference_) + " references belong to no leaf");
-    const Scan whole = scan(references_, header_.triangle_count);
+    // A damaged header may count more triangles than there are, and more than memory has room for.
+    std::vector<uint8_t> named(view_.part(Kind::kTria).usable ? header_.triangle_count : 0, 0);
+    const Scan whole = scan(references_, named);
     if (!whole.in_range)
       for (uint64_t i = 0; i < references_.size(); ++i)
-        if (references_[i] >= header_.triangle_count)
-          find_reference(RuleId::kReferenceOutOfRange, i,
-                         "is " + std::to_string(references_[i]) + ", triangle_count is " +
-                             std::to_string(header_.triangle_count));
+        if (references_[i] >= named.size())
+          find_reference(
+              RuleId::kReferenceOutOfRange, i,
+              "is " + std::to_string(references_[i]) + ", triangle_count is " + std::to_string(named.size()));
     // Every fall lies between two leaves, where leaves are as they should be: else look for the others.
     if (whole.falls != falls_between_ && !report_.has(RuleId::kReferencesNotCumulative)) find_falls();
-    check_triangles(whole.in_range);
+    check_triangles(named);
   }
 
   [[gnu::cold]] void find_falls() {
@@ -261,14 +272,7 @@ class NtreeCheck {
   }
 
   // Triangles of no leaf: in an exact file there are none; else candidates stay for their Line Spaces.
-  void check_triangles(bool in_range_all) {
-    if (!view_.part(Kind::kTria).usable) return;
-    std::vector<uint8_t> named(header_.triangle_count, 0);
-    if (in_range_all)
-      for (uint32_t reference : references_) named[reference] = 1;
-    else
-      for (uint32_t reference : references_)
-        if (reference < named.size()) named[reference] = 1;
+  void check_triangles(std::vector<uint8_t>& named) {
     if (!exact_) add_candidates(named);
     const auto unused = std::find(named.begin(), named.end(), uint8_t{0});
     if (unused == named.end()) return;

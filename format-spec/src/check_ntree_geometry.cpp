@@ -147,8 +147,11 @@ class NtreeGeometryCheck {
         if (reaches(Corners(triangles_[references[k]]), cube, view_.header.ntree_margin + slack_)) continue;
         const uint64_t at = (cell.child & ~LSP_LEAF_BIT) + k;
         report_.add(RuleId::kTriangleOutsideCell, view_.offset_of(Kind::kRefs, at * 4),
-                    view_.length_of(Kind::kRefs, 4), element_path(Kind::kRefs, at),
-                    "triangle " + std::to_string(references[k]) + " is not near cell " + std::to_string(c));
+                    view_.length_of(Kind::kRefs, 4), [&] {
+                      return std::pair{element_path(Kind::kRefs, at),
+                                       "triangle " + std::to_string(references[k]) + " is not near cell " +
+                                           std::to_string(c)};
+                    });
       }
     });
   }
@@ -170,7 +173,7 @@ class NtreeGeometryCheck {
     const Corners corners(triangles_[t]);
     for (int a = 0; a < 3; ++a)
       if (!(corners.lo[a] >= root_.lo[a] - slack_ && corners.hi[a] <= root_.lo[a] + root_.size + slack_)) {
-        lacking(t, "a corner lies outside the cube");
+        lacking(t, [] { return std::string("a corner lies outside the cube"); });
         return;
       }
     visits_ = 0;
@@ -183,7 +186,7 @@ class NtreeGeometryCheck {
     // there are more visits than that allows, references are missing, though no cell shows it for sure: a
     // triangle between two cells. It also keeps a hostile file from costing more than its size.
     if (visits_++ > uint64_t{held_[t]} * (LSP_MAX_NTREE_DEPTH - 1)) {
-      lacking(t, "its references are fewer than the nodes that it reaches into");
+      lacking(t, [] { return std::string("its references are fewer than the nodes that it reaches into"); });
       return false;
     }
     const Cube cube = nodes_[node];
@@ -216,15 +219,20 @@ class NtreeGeometryCheck {
     }
     if (!reaches(corners, cube, -slack_)) return true;
     if (filled && is_node(cells_[c])) return descend(t, corners, cells_[c].child);
-    lacking(t, filled ? "cell " + std::to_string(c) + " does not hold it"
-                      : "it reaches into cell " + std::to_string(index) + " of node " + std::to_string(node) +
-                            ", which is empty");
+    lacking(t, [&] {
+      return filled ? "cell " + std::to_string(c) + " does not hold it"
+                    : "it reaches into cell " + std::to_string(index) + " of node " + std::to_string(node) +
+                          ", which is empty";
+    });
     return false;
   }
 
-  void lacking(uint64_t t, const std::string& message) {
+  template <class Describe>
+  void lacking(uint64_t t, Describe&& message) {
     report_.add(RuleId::kCellLacksTriangle, view_.offset_of(Kind::kTria, t * sizeof(LspTriangle)),
-                view_.length_of(Kind::kTria, sizeof(LspTriangle)), element_path(Kind::kTria, t), message);
+                view_.length_of(Kind::kTria, sizeof(LspTriangle)), [&] {
+                  return std::pair{element_path(Kind::kTria, t), message()};
+                });
   }
 
   const FileView& view_;
