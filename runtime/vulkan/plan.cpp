@@ -13,11 +13,14 @@ struct Wanted {
 constexpr uint32_t kTraces = LSP_USE_EXACT | LSP_USE_APPROXIMATE;
 constexpr Wanted kWanted[] = {
     {LSP_BINDING_NODES, LSP_SECTION_NODE, kTraces},
+    {LSP_BINDING_NODES, LSP_SECTION_GRID, kTraces},
     {LSP_BINDING_TRIANGLES, LSP_SECTION_TRIA, kTraces},
     {LSP_BINDING_NORMALS, LSP_SECTION_NRML, kTraces},
     {LSP_BINDING_LINE_SPACES, LSP_SECTION_LSPC, LSP_USE_APPROXIMATE},
     {LSP_BINDING_BIT_WORDS, LSP_SECTION_BITS, LSP_USE_APPROXIMATE},
     {LSP_BINDING_CANDIDATES, LSP_SECTION_CAND, LSP_USE_APPROXIMATE},
+    {LSP_BINDING_CELLS, LSP_SECTION_CELL, kTraces},
+    {LSP_BINDING_REFERENCES, LSP_SECTION_REFS, kTraces},
     {LSP_BINDING_NONE, LSP_SECTION_MATL, LSP_USE_MATERIALS},
 };
 
@@ -49,6 +52,7 @@ extern "C" lsp_status lsp_vulkan_plan_buffers(const lsp_scene* scene, uint32_t u
   plan->buffers[0] = {LSP_BINDING_HEADER, 0, 0, sizeof(LspHeader)};
   plan->buffer_count = 1;
   plan->bytes = sizeof(LspHeader);
+  plan->base_structure = scene->header->base_structure;
   plan->addresses = (uses & LSP_USE_ADDRESSES_ALWAYS) != 0 ? 1 : 0;
   for (const Wanted& wanted : kWanted) {
     if ((uses & wanted.uses) == 0) continue;

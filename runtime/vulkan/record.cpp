@@ -4,18 +4,41 @@
 
 namespace {
 
-constexpr uint32_t kTraceSpirv[] =
+constexpr uint32_t kBvh[] =
 #include "trace.spv.inc"
     ;
-constexpr uint32_t kTraceCountSpirv[] =
+constexpr uint32_t kBvhCount[] =
 #include "trace_count.spv.inc"
     ;
-constexpr uint32_t kAddressesSpirv[] =
+constexpr uint32_t kBvhAddresses[] =
 #include "trace_addresses.spv.inc"
     ;
-constexpr uint32_t kAddressesCountSpirv[] =
+constexpr uint32_t kBvhAddressesCount[] =
 #include "trace_addresses_count.spv.inc"
     ;
+constexpr uint32_t kNTree[] =
+#include "trace_ntree.spv.inc"
+    ;
+constexpr uint32_t kNTreeCount[] =
+#include "trace_ntree_count.spv.inc"
+    ;
+constexpr uint32_t kNTreeAddresses[] =
+#include "trace_ntree_addresses.spv.inc"
+    ;
+constexpr uint32_t kNTreeAddressesCount[] =
+#include "trace_ntree_addresses_count.spv.inc"
+    ;
+
+struct Spirv {
+  const uint32_t* words;
+  size_t bytes;
+};
+// By base structure, addresses, counting.
+constexpr Spirv kShaders[2][2][2] = {
+    {{{kBvh, sizeof kBvh}, {kBvhCount, sizeof kBvhCount}},
+     {{kBvhAddresses, sizeof kBvhAddresses}, {kBvhAddressesCount, sizeof kBvhAddressesCount}}},
+    {{{kNTree, sizeof kNTree}, {kNTreeCount, sizeof kNTreeCount}},
+     {{kNTreeAddresses, sizeof kNTreeAddresses}, {kNTreeAddressesCount, sizeof kNTreeAddressesCount}}}};
 
 template <class Function>
 bool load(VkDevice device, PFN_vkGetDeviceProcAddr get, const char* name, Function* function) {
@@ -56,14 +79,10 @@ extern "C" void lsp_vulkan_record_upload_barrier(const lsp_vulkan_functions* fun
                                   VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, 0, 1, &barrier, 0, nullptr, 0, nullptr);
 }
 
-extern "C" const uint32_t* lsp_vulkan_trace_spirv(int counting, size_t* bytes) {
-  *bytes = counting != 0 ? sizeof kTraceCountSpirv : sizeof kTraceSpirv;
-  return counting != 0 ? kTraceCountSpirv : kTraceSpirv;
-}
-
-extern "C" const uint32_t* lsp_vulkan_trace_addresses_spirv(int counting, size_t* bytes) {
-  *bytes = counting != 0 ? sizeof kAddressesCountSpirv : sizeof kAddressesSpirv;
-  return counting != 0 ? kAddressesCountSpirv : kAddressesSpirv;
+extern "C" const uint32_t* lsp_vulkan_trace_spirv(const lsp_vulkan_plan* plan, int counting, size_t* bytes) {
+  const Spirv& shader = kShaders[plan->base_structure == LSP_BASE_NTREE][plan->addresses != 0][counting != 0];
+  *bytes = shader.bytes;
+  return shader.words;
 }
 
 extern "C" void lsp_vulkan_address_table(const lsp_vulkan_plan* plan, const VkDeviceAddress* buffer_addresses,
@@ -71,7 +90,7 @@ extern "C" void lsp_vulkan_address_table(const lsp_vulkan_plan* plan, const VkDe
   for (uint32_t i = 0; i < LSP_VULKAN_ADDRESS_COUNT; ++i) table[i] = 0;
   for (uint32_t i = 0; i < plan->buffer_count; ++i) {
     const uint32_t binding = plan->buffers[i].binding;
-    if (binding >= LSP_BINDING_NODES && binding <= LSP_BINDING_CANDIDATES) {
+    if (binding >= LSP_BINDING_NODES && binding <= LSP_BINDING_REFERENCES) {
       table[binding - LSP_BINDING_NODES] = buffer_addresses[i];
     }
   }

@@ -1,6 +1,7 @@
 // One ray per invocation: rays from a buffer, hits into another. With LSP_COUNT defined, sums of the work done
 // are added to the counters (struct lsp_trace_counts of lsp.h, less its first field: the host knows the rays).
-// With LSP_ADDRESSES defined, the sections are read through buffer device addresses.
+// With LSP_ADDRESSES defined, the sections are read through buffer device addresses; with LSP_NTREE, the base
+// structure is an NTree.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 
@@ -15,8 +16,8 @@
 layout(local_size_x = 64) in;
 
 // As words: 16-byte loads and stores are faster than member by member, and keep every bit.
-layout(std430, set = 0, binding = 7) readonly buffer RayBuffer { uvec4 ray_words[]; };
-layout(std430, set = 0, binding = 8) writeonly buffer HitBuffer { uvec4 hit_words[]; };
+layout(std430, set = 0, binding = 9) readonly buffer RayBuffer { uvec4 ray_words[]; };
+layout(std430, set = 0, binding = 10) writeonly buffer HitBuffer { uvec4 hit_words[]; };
 
 // The kind of trace is part of the pipeline: what it does not need (look-ups in an exact trace) is compiled
 // away, which matters most where a device runs both sides of every branch.
@@ -29,7 +30,7 @@ layout(push_constant) uniform Constants {
 } constants;
 
 #ifdef LSP_COUNT
-layout(std430, set = 0, binding = 9) buffer CounterBuffer { uint counter_words[]; };
+layout(std430, set = 0, binding = 11) buffer CounterBuffer { uint counter_words[]; };
 
 // Adds to the 64-bit field `field`; the carry is taken by whoever caused it.
 void add(uint field, uint n) {

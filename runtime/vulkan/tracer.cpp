@@ -42,14 +42,13 @@ class Shader {
   Shader(const Shader&) = delete;
   Shader& operator=(const Shader&) = delete;
 
-  // A pipeline for traces with `flags` whose stack has `stack` entries, for a plan with or without addresses.
-  // The caller destroys it.
-  VkPipeline create_pipeline(bool addresses, bool counting, uint32_t flags, uint32_t stack) {
+  // A pipeline for traces with `flags` whose stack has `stack` entries, for a plan like this one. The caller
+  // destroys it.
+  VkPipeline create_pipeline(const lsp_vulkan_plan& plan, bool counting, uint32_t flags, uint32_t stack) {
     size_t bytes = 0;
     VkShaderModuleCreateInfo module_info{};
     module_info.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
-    module_info.pCode = addresses ? lsp_vulkan_trace_addresses_spirv(counting ? 1 : 0, &bytes)
-                                  : lsp_vulkan_trace_spirv(counting ? 1 : 0, &bytes);
+    module_info.pCode = lsp_vulkan_trace_spirv(&plan, counting ? 1 : 0, &bytes);
     module_info.codeSize = bytes;
     VkShaderModule module = VK_NULL_HANDLE;
     check(device_.vk.vkCreateShaderModule(device_.handle, &module_info, nullptr, &module),
@@ -153,8 +152,8 @@ class Shader {
 // The pipelines for one scene's stack, one for each kind of trace, made when they are first needed.
 class Pipelines {
  public:
-  Pipelines(Device& device, Shader& shader, bool addresses, uint32_t stack)
-      : device_(device), shader_(shader), addresses_(addresses), stack_(stack) {}
+  Pipelines(Device& device, Shader& shader, const lsp_vulkan_plan& plan, uint32_t stack)
+      : device_(device), shader_(shader), plan_(plan), stack_(stack) {}
   ~Pipelines() {
     for (const auto& [key, pipeline] : made_) device_.vk.vkDestroyPipeline(device_.handle, pipeline, nullptr);
   }
@@ -162,14 +161,14 @@ class Pipelines {
   Pipelines& operator=(const Pipelines&) = delete;
   VkPipeline get(bool counting, uint32_t flags) {
     VkPipeline& pipeline = made_[{counting, flags}];
-    if (pipeline == VK_NULL_HANDLE) pipeline = shader_.create_pipeline(addresses_, counting, flags, stack_);
+    if (pipeline == VK_NULL_HANDLE) pipeline = shader_.create_pipeline(plan_, counting, flags, stack_);
     return pipeline;
   }
 
  private:
   Device& device_;
   Shader& shader_;
-  bool addresses_;
+  lsp_vulkan_plan plan_;
   uint32_t stack_;
   std::map<std::pair<bool, uint32_t>, VkPipeline> made_;
 };
@@ -275,7 +274,7 @@ void VulkanTracer::Impl::unload() noexcept {
 // Makes `buffers` the scene and traces one ray, so that a device that cannot read them fails here.
 void VulkanTracer::Impl::attach(SceneBuffers&& buffers) {
   scene_buffers = std::make_unique<SceneBuffers>(std::move(buffers));
-  pipelines_ = std::make_unique<Pipelines>(*device, *shader_, scene_buffers->plan().addresses != 0,
+  pipelines_ = std::make_unique<Pipelines>(*device, *shader_, scene_buffers->plan(),
                                            std::max(scene_.header->max_stack, 1u));
   const LspHeader& header = *scene_.header;
   const LspRay ray{header.bounds_min, 0.0f, {1.0f, 1.0f, 1.0f}, 3.402823e38f};

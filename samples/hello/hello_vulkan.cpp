@@ -171,7 +171,7 @@ int main(int argc, char** argv) {
   VkPipelineLayout layout;
   check(vkCreatePipelineLayout(gpu.device, &layout_info, nullptr, &layout), "vkCreatePipelineLayout");
   auto module_info = make<VkShaderModuleCreateInfo>(VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO);
-  module_info.pCode = lsp_vulkan_trace_spirv(0, &module_info.codeSize);
+  module_info.pCode = lsp_vulkan_trace_spirv(&plan, 0, &module_info.codeSize);
   VkShaderModule module;
   check(vkCreateShaderModule(gpu.device, &module_info, nullptr, &module), "vkCreateShaderModule");
   auto pipeline_info = make<VkComputePipelineCreateInfo>(VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO);

@@ -102,8 +102,10 @@ class Baked : public testing::TestWithParam<const char*> {
     if (!path_.empty()) fs::remove(path_);
   }
 
-  void bake_and_compare(const Mesh& mesh, Purpose purpose, bool exact, uint32_t depth) {
+  void bake_and_compare(const Mesh& mesh, Base base, Purpose purpose, bool exact, uint32_t depth) {
     BakeOptions options;
+    options.base = base;
+    options.ntree.branching = 5;
     options.purpose = purpose;
     options.line_space.resolution = 4;
     options.line_space.depths = {depth / 2, depth};
@@ -141,20 +143,26 @@ class Baked : public testing::TestWithParam<const char*> {
 
 TEST_P(Baked, Room) {
   const std::string what = GetParam();
+  const bool ntree = what.starts_with("ntree_");
+  const std::string purpose = ntree ? what.substr(6) : what;
+  const Base base = ntree ? Base::kNTree : Base::kBvh;
+  const uint32_t depth = ntree ? 2 : 6;
   const Mesh mesh = make_room();
-  if (what == "all") bake_and_compare(mesh, Purpose::kAll, true, 6);
-  if (what == "ao") bake_and_compare(mesh, Purpose::kAo, true, 6);
-  if (what == "visibility") bake_and_compare(mesh, Purpose::kVisibility, true, 6);
-  if (what == "approximate_only") bake_and_compare(mesh, Purpose::kAll, false, 6);
+  if (purpose == "all") bake_and_compare(mesh, base, Purpose::kAll, true, depth);
+  if (purpose == "ao") bake_and_compare(mesh, base, Purpose::kAo, true, depth);
+  if (purpose == "visibility") bake_and_compare(mesh, base, Purpose::kVisibility, true, depth);
+  if (purpose == "approximate_only") bake_and_compare(mesh, base, Purpose::kAll, false, depth);
 }
-INSTANTIATE_TEST_SUITE_P(For, Baked, testing::Values("all", "ao", "visibility", "approximate_only"),
+INSTANTIATE_TEST_SUITE_P(For, Baked,
+                         testing::Values("all", "ao", "visibility", "approximate_only", "ntree_all",
+                                         "ntree_visibility", "ntree_approximate_only"),
                          [](const auto& info) { return std::string(info.param); });
 
 using BakedScene = Baked;
 TEST_P(BakedScene, Agrees) {
   const fs::path mesh = fs::path(LSP_SCENES_DIR) / GetParam();
   if (!fs::exists(mesh)) GTEST_SKIP() << mesh << " is not there";
-  bake_and_compare(import_meshes(std::array{mesh}, {}), Purpose::kAll, true, 7);
+  bake_and_compare(import_meshes(std::array{mesh}, {}), Base::kBvh, Purpose::kAll, true, 7);
 }
 INSTANTIATE_TEST_SUITE_P(Of, BakedScene, testing::Values("paper/bunny.ply", "paper/sibenik.obj"),
                          [](const auto& info) { return fs::path(info.param).stem().string(); });

@@ -4,12 +4,15 @@
  *   #extension GL_GOOGLE_include_directive : require
  *   #define LSP_SET 0                // descriptor set of the scene's buffers, default 0
  *   #define LSP_FIRST_BINDING 0      // binding of the header; the others follow it, default 0
+ *   #define LSP_NTREE                // the scene's base structure is an NTree, not a BVH
  *   #include "lsp/lsp.glsl"
  *
  *   LspHit hit = lsp_trace(ray, LSP_TRACE_APPROXIMATE_BIT, 0.0);
  *
  * Bindings, each a read-only storage buffer, all from the file as it lies on disk:
  *   +0 header   +1 NODE   +2 TRIA   +3 NRML   +4 LSPC   +5 BITS   +6 CAND
+ * and of an NTree
+ *   +1 GRID   +7 CELL   +8 REFS
  * A section the file does not have is bound to any buffer (the header's, say): it is not read.
  *
  * The stack lives in LSP_STACK_SIZE entries of 8 bytes: define it as header.max_stack, or leave it to the
@@ -38,7 +41,13 @@ layout(constant_id = LSP_STACK_CONSTANT_ID) const uint lsp_stack_size = LSP_MAX_
 /* Arrays are read 16 bytes at a time, which is faster than member by member; the functions below put the
  * words into the structs of layout.h. */
 layout(std430, set = LSP_SET, binding = LSP_FIRST_BINDING + 0) readonly buffer LspHeaderBuffer { LspHeader lsp_header; };
+#ifdef LSP_NTREE
+layout(std430, set = LSP_SET, binding = LSP_FIRST_BINDING + 1) readonly buffer LspGridBuffer { uvec2 lsp_grid_words[]; };
+layout(std430, set = LSP_SET, binding = LSP_FIRST_BINDING + 7) readonly buffer LspCellBuffer { LspCell lsp_cells[]; };
+layout(std430, set = LSP_SET, binding = LSP_FIRST_BINDING + 8) readonly buffer LspReferenceBuffer { uint lsp_references[]; };
+#else
 layout(std430, set = LSP_SET, binding = LSP_FIRST_BINDING + 1) readonly buffer LspNodeBuffer { uvec4 lsp_node_words[]; };
+#endif
 layout(std430, set = LSP_SET, binding = LSP_FIRST_BINDING + 2) readonly buffer LspTriangleBuffer { uvec4 lsp_triangle_words[]; };
 layout(std430, set = LSP_SET, binding = LSP_FIRST_BINDING + 3) readonly buffer LspNormalBuffer { LspCornerNormals lsp_corner_normals[]; };
 layout(std430, set = LSP_SET, binding = LSP_FIRST_BINDING + 4) readonly buffer LspLineSpaceBuffer { uvec4 lsp_line_space_words[]; };
@@ -56,12 +65,23 @@ layout(std430, set = LSP_SET, binding = LSP_FIRST_BINDING + 6) readonly buffer L
 #define LSP_STORE3(v) (v)
 #define LSP_HEADER lsp_header
 #define LSP_HAS_NORMALS ((lsp_header.required_features & LSP_FEATURE_NORMALS) != 0u)
-#define LSP_NODE(i) lsp_load_node(i)
 #define LSP_TRIANGLE(i) lsp_load_triangle(i)
 #define LSP_NORMALS(i) lsp_corner_normals[i]
 #define LSP_LINE_SPACE(i) lsp_load_line_space(i)
 #define LSP_BIT_WORD(i) lsp_load_bit_word(i)
 #define LSP_CANDIDATE(i) lsp_candidate_words[i]
+
+#ifdef LSP_NTREE
+#define LSP_GRID(i) lsp_load_grid(i)
+#define LSP_CELL(i) lsp_cells[i]
+#define LSP_REFERENCE(i) lsp_references[i]
+
+LspBitWord lsp_load_grid(uint i) {
+  uvec2 w = lsp_grid_words[i];
+  return LspBitWord(w.x, w.y);
+}
+#else
+#define LSP_NODE(i) lsp_load_node(i)
 
 LspNode lsp_load_node(uint i) {
   uvec4 a = lsp_node_words[4u * i];
@@ -71,6 +91,7 @@ LspNode lsp_load_node(uint i) {
   return LspNode(uintBitsToFloat(a.xyz), a.w, uintBitsToFloat(b.xyz), b.w, uintBitsToFloat(c.xyz), c.w,
                  uintBitsToFloat(d.xyz), d.w);
 }
+#endif
 
 LspTriangle lsp_load_triangle(uint i) {
   uvec4 a = lsp_triangle_words[3u * i];

@@ -9,7 +9,7 @@
  * offset
  *                                                 +-- upload: copies straight from the mapping, in pieces
  *
- * Shaders: include lsp/lsp.glsl in your own and bind the scene's buffers to bindings 0 to 6
+ * Shaders: include lsp/lsp.glsl in your own and bind the scene's buffers to bindings 0 to 6, of an NTree to 8
  * (lsp_addresses.glsl where a section is too large for a storage buffer); or use the ready trace shader here,
  * which reads rays from a buffer and writes hits to another.
  *
@@ -31,8 +31,8 @@ extern "C" {
  */
 
 /* What the scene is wanted for; a section that nothing asks for gets no buffer and is never read. */
-#define LSP_USE_EXACT 0x1u       /* exact traces: NODE, TRIA, NRML */
-#define LSP_USE_APPROXIMATE 0x2u /* approximate traces: NODE, TRIA, NRML, LSPC, BITS, CAND */
+#define LSP_USE_EXACT 0x1u       /* exact traces: NODE (NTree: GRID, CELL, REFS), TRIA, NRML */
+#define LSP_USE_APPROXIMATE 0x2u /* approximate traces: these and LSPC, BITS, CAND */
 #define LSP_USE_MATERIALS 0x4u   /* MATL, for the engine's own shaders */
 
 /* And whether sections may be read through buffer device addresses instead of descriptors, where the device's
@@ -40,23 +40,25 @@ extern "C" {
 #define LSP_USE_ADDRESSES_IF_NEEDED 0x100u /* where one is larger than max_storage_buffer_range */
 #define LSP_USE_ADDRESSES_ALWAYS 0x200u    /* for tests: descriptors are faster */
 
-/* Bindings of the trace shader's descriptor set, all storage buffers; 0 to 6 are those of lsp.glsl. */
+/* Bindings of the trace shader's descriptor set, all storage buffers; 0 to 8 are those of lsp.glsl. */
 typedef enum lsp_vulkan_binding {
   LSP_BINDING_HEADER = 0,
-  LSP_BINDING_NODES = 1,
+  LSP_BINDING_NODES = 1, /* of an NTree: GRID */
   LSP_BINDING_TRIANGLES = 2,
   LSP_BINDING_NORMALS = 3,
   LSP_BINDING_LINE_SPACES = 4,
   LSP_BINDING_BIT_WORDS = 5,
   LSP_BINDING_CANDIDATES = 6,
-  LSP_BINDING_RAYS = 7,     /* LspRay, read */
-  LSP_BINDING_HITS = 8,     /* LspHit, written */
-  LSP_BINDING_COUNTERS = 9, /* lsp_trace_counts, added to; only the counting shader uses it */
-  LSP_BINDING_COUNT = 10,
-  LSP_BINDING_NONE = 10 /* of MATL's buffer, which the trace shader does not read */
+  LSP_BINDING_CELLS = 7,      /* of an NTree */
+  LSP_BINDING_REFERENCES = 8, /* of an NTree */
+  LSP_BINDING_RAYS = 9,       /* LspRay, read */
+  LSP_BINDING_HITS = 10,      /* LspHit, written */
+  LSP_BINDING_COUNTERS = 11,  /* lsp_trace_counts, added to; only the counting shader uses it */
+  LSP_BINDING_COUNT = 12,
+  LSP_BINDING_NONE = 12 /* of MATL's buffer, which the trace shader does not read */
 } lsp_vulkan_binding;
 
-#define LSP_VULKAN_MAX_BUFFERS 8u
+#define LSP_VULKAN_MAX_BUFFERS 10u
 
 /* What the library has to know of the device. */
 typedef struct lsp_vulkan_limits {
@@ -80,6 +82,7 @@ typedef struct lsp_vulkan_plan {
   uint64_t bytes;           /* of all buffers together */
   VkBufferUsageFlags usage; /* of every buffer; an imported one can do without the transfer bit */
   uint32_t addresses; /* nonzero: the sections are read through addresses, see lsp_vulkan_address_table */
+  uint32_t base_structure; /* LSP_BASE_*: the shader has to be made for it */
 } lsp_vulkan_plan;
 
 /* Usage of every buffer of a plan without addresses. */
@@ -165,13 +168,11 @@ typedef struct lsp_vulkan_trace_constants {
   uint32_t count;
 } lsp_vulkan_trace_constants;
 
-/* SPIR-V (for Vulkan 1.1, no features needed) of the trace shader, entry point "main"; with `counting`
- * nonzero the one that adds to the counters. Sets *bytes to its size. The words live as long as the program.
- */
-const uint32_t* lsp_vulkan_trace_spirv(int counting, size_t* bytes);
-
-/* The same for plans with addresses; the device's bufferDeviceAddress feature must be on. */
-const uint32_t* lsp_vulkan_trace_addresses_spirv(int counting, size_t* bytes);
+/* SPIR-V (for Vulkan 1.1) of the trace shader for scenes planned like `plan`, entry point "main"; with `counting`
+ * nonzero the one that adds to the counters. Only base_structure and addresses of the plan matter; with addresses
+ * the device's bufferDeviceAddress feature must be on, else no feature is needed. Sets *bytes to the size. The words
+ * live as long as the program. */
+const uint32_t* lsp_vulkan_trace_spirv(const lsp_vulkan_plan* plan, int counting, size_t* bytes);
 
 /* The bindings of its descriptor set layout. */
 void lsp_vulkan_layout_bindings(VkDescriptorSetLayoutBinding bindings[LSP_BINDING_COUNT]);
@@ -186,7 +187,7 @@ void lsp_vulkan_write_descriptors(const lsp_vulkan_functions* functions, VkDevic
 /* Plans with addresses: fills the table that the shader reads them from. `buffer_addresses` are those of the
  * plan's buffers in its order, from vkGetBufferDeviceAddress. The engine puts the table into a storage
  * buffer, and after lsp_vulkan_write_descriptors points the set at it with lsp_vulkan_write_address_table. */
-#define LSP_VULKAN_ADDRESS_COUNT 6u
+#define LSP_VULKAN_ADDRESS_COUNT 8u
 void lsp_vulkan_address_table(const lsp_vulkan_plan* plan, const VkDeviceAddress* buffer_addresses,
                               VkDeviceAddress table[LSP_VULKAN_ADDRESS_COUNT]);
 void lsp_vulkan_write_address_table(const lsp_vulkan_functions* functions, VkDevice device,

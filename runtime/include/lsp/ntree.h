@@ -61,7 +61,7 @@ LSP_FN uint lsp_ntree_next_filled(LSP_SCENE_ uint first_word, uint cell, uint ce
 }
 
 /* Traces from the root. flags: LSP_TRACE_*_BIT. */
-LSP_FN LspBest lsp_traverse_ntree(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod LSP_COUNTS_PARAM) {
+LSP_FN LspBest lsp_traverse(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod LSP_COUNTS_PARAM) {
   LspBest best;
   best.t = s.tmax;
   best.u = 0.0f;
@@ -69,7 +69,7 @@ LSP_FN LspBest lsp_traverse_ntree(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, flo
   best.triangle = LSP_NONE;
   best.flags = 0u;
 
-  /* stack[1 + depth]: the node left for its child; stack[0]: see the end of lsp_traverse. */
+  /* stack[1 + depth]: the node left for its child; stack[0]: as in lsp/bvh.h. */
   uint stack[LSP_MAX_NTREE_DEPTH + 1u];
   bool any_hit = (flags & LSP_TRACE_ANY_HIT_BIT) != 0u;
   int n = int(LSP_HEADER.ntree_branching);

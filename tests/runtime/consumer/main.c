@@ -12,8 +12,9 @@ int main(void) {
   if (lsp_open("not a file", 10, &scene, &error) == LSP_OK) return 2;
   uint64_t size = 0;
   if (lsp_unpacked_size("not a file", 10, &size, &error) == LSP_OK) return 3;
+  const lsp_vulkan_plan plan = {.base_structure = LSP_BASE_BVH};
   size_t words = 0;
-  if (lsp_vulkan_trace_spirv(0, &words)[0] != 0x07230203u || words < 1000) return 4;
+  if (lsp_vulkan_trace_spirv(&plan, 0, &words)[0] != 0x07230203u || words < 1000) return 4;
   puts("consumer ok");
   return 0;
 }

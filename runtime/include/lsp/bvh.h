@@ -1,0 +1,95 @@
+/* Traversal of a BVH, in the common subset of GLSL 4.6 and C++20; lsp/traverse.h includes it. */
+#ifndef LSP_BVH_H
+#define LSP_BVH_H
+
+/* Traces from the root. flags: LSP_TRACE_*_BIT. */
+LSP_FN LspBest lsp_traverse(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod LSP_COUNTS_PARAM) {
+  LspBest best;
+  best.t = s.tmax;
+  best.u = 0.0f;
+  best.v = 0.0f;
+  best.triangle = LSP_NONE;
+  best.flags = 0u;
+
+  uint stack_ref[LSP_STACK_SIZE];
+  float stack_t[LSP_STACK_SIZE];
+  uint top = 0u;
+  bool any_hit = (flags & LSP_TRACE_ANY_HIT_BIT) != 0u;
+
+  vec3 root_lo = LSP_LOAD3(LSP_HEADER.bounds_min);
+  vec3 root_hi = LSP_LOAD3(LSP_HEADER.bounds_max);
+  float root_t = lsp_box(s, root_lo, root_hi, best.t);
+  uint ref = LSP_NONE;
+  if (root_t <= best.t) ref = lsp_visit(LSP_SCENE_ARG_ s, flags, lod, LSP_HEADER.root, LSP_HEADER.root_line_space, root_lo, root_hi, root_t LSP_COUNTS_ARG);
+
+  /* A device may end every loop early, the inner ones too (lavapipe does), and then only memory tells: what the
+   * compiler knows to hold behind a loop does not. Entry 0 of the stack is LSP_NONE once all work is done. */
+  bool done = ref == LSP_NONE;
+  stack_ref[0] = ref;
+  for (uint step = 0u; !done && step < LSP_HEADER.max_steps; ++step) {
+    bool pop = true;
+    if ((ref & LSP_LEAF_BIT) != 0u) {
+      uint first = ref & LSP_LEAF_FIRST_MASK;
+      uint count = ((ref >> LSP_LEAF_COUNT_SHIFT) & LSP_LEAF_COUNT_MASK) + 1u;
+      LSP_COUNT_ADD(triangles, count);
+      uint i = 0u;
+      for (; i < count; ++i) lsp_triangle(LSP_SCENE_ARG_ s, first + i, best);
+      if (i != count) break; /* cut short; not written as i < count, which compilers take to be false here */
+    } else if ((ref & LSP_STACK_LINE_SPACE_BIT) != 0u) {
+      LSP_COUNT_ADD(shafts, 1u);
+      lsp_look_up(LSP_SCENE_ARG_ s, ref & ~LSP_STACK_LINE_SPACE_BIT, best);
+    } else {
+      LSP_COUNT_ADD(nodes, 1u);
+      LspNode node = LSP_NODE(ref);
+      vec3 lo0 = LSP_LOAD3(node.lo0);
+      vec3 hi0 = LSP_LOAD3(node.hi0);
+      vec3 lo1 = LSP_LOAD3(node.lo1);
+      vec3 hi1 = LSP_LOAD3(node.hi1);
+      float t0 = lsp_box(s, lo0, hi0, best.t);
+      float t1 = lsp_box(s, lo1, hi1, best.t);
+      uint ref0 = LSP_NONE;
+      uint ref1 = LSP_NONE;
+      if (t0 <= best.t) ref0 = lsp_visit(LSP_SCENE_ARG_ s, flags, lod, node.child0, node.line_space0, lo0, hi0, t0 LSP_COUNTS_ARG);
+      if (t1 <= best.t) ref1 = lsp_visit(LSP_SCENE_ARG_ s, flags, lod, node.child1, node.line_space1, lo1, hi1, t1 LSP_COUNTS_ARG);
+      if (ref0 != LSP_NONE && ref1 != LSP_NONE) {
+        if (top >= LSP_STACK_SIZE) break;
+        /* Any hit: the builder put the child of larger area first, where a hit is likeliest. */
+        if (any_hit || t0 <= t1) {
+          stack_ref[top] = ref1;
+          stack_t[top] = t1;
+          ref = ref0;
+        } else {
+          stack_ref[top] = ref0;
+          stack_t[top] = t0;
+          ref = ref1;
+        }
+        ++top;
+        pop = false;
+      } else if (ref0 != LSP_NONE) {
+        ref = ref0;
+        pop = false;
+      } else if (ref1 != LSP_NONE) {
+        ref = ref1;
+        pop = false;
+      }
+    }
+    if (pop) {
+      if (any_hit && best.triangle != LSP_NONE) {
+        done = true;
+        stack_ref[0] = LSP_NONE;
+      } else {
+        ref = LSP_NONE;
+        while (top > 0u && ref == LSP_NONE) {
+          --top;
+          if (stack_t[top] <= best.t) ref = stack_ref[top];
+        }
+        done = ref == LSP_NONE && top == 0u;
+        if (done) stack_ref[0] = LSP_NONE;
+      }
+    }
+  }
+  best.complete = stack_ref[0] == LSP_NONE;
+  return best;
+}
+
+#endif
