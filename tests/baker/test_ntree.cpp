@@ -171,7 +171,7 @@ TEST(NTree, CarriesLineSpacesOnItsLowestNodes) {
   options.line_space.resolution = 5;  // its own, not the tree's
   options.line_space.depths = {1, 2};
   options.ntree.leaf_triangles = 2;
-  const Baked baked = bake(sphere(30), options);
+  const Baked baked = bake(sphere(16), options);
   size_t nodes = 0, carried = 0, terminal = 0;
   for (const LspCell& c : baked.ntree.cells) {
     nodes += !(c.child & LSP_LEAF_BIT);
@@ -191,7 +191,7 @@ TEST(NTree, AnswersApproximatelyWithoutItsExactPart) {
   options.base = Base::kNTree;
   options.ntree.branching = 6;
   options.line_space.depths = {1};
-  Baked baked = bake(sphere(60), options);
+  Baked baked = bake(sphere(30), options);
   const std::vector<LspRay> rays = rays_about(baked, 5000, 1.5f);
   const uint32_t flags = LSP_TRACE_APPROXIMATE | LSP_TRACE_NEAR_APPROXIMATE;
   const std::vector<LspHit> before = trace(baked, rays, flags);

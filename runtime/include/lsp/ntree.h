@@ -105,7 +105,8 @@ LSP_FN LspBest lsp_traverse(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod
   float size = lsp_ntree_cell_size(LSP_SCENE_ARG_ 0u);
   ivec3 cell = far ? base : lsp_ntree_enter(LSP_SCENE_ARG_ s, base, size, t);
   vec3 next = lsp_ntree_next(LSP_SCENE_ARG_ s, cell, ahead, size);
-  bool visit = true; /* the cell is yet to be looked at */
+  bool visit = true; /* the cell is yet to be looked at; false: its child is done */
+  int axis = 0;      /* of the last step */
 
   for (uint step = 0u; !done && step < LSP_HEADER.max_steps; ++step) {
     ivec3 local = cell - base;
@@ -158,21 +159,28 @@ LSP_FN LspBest lsp_traverse(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod
         index = lsp_ntree_next_filled(LSP_SCENE_ARG_ node * words, index, un * un * un);
         out_of_node = index == un * un * un;
         cell = base + ivec3(int(index % un), int(index / un % un), int(index / (un * un)));
-      } else if (next.x <= next.y && next.x <= next.z) {
-        t = lsp_max(t, next.x);
-        cell.x += gone_x ? -1 : 1;
-        out_of_node = uint(cell.x - base.x) >= un;
-        next.x = lsp_ntree_next(LSP_SCENE_ARG_ s, cell, ahead, size).x;
-      } else if (next.y <= next.z) {
-        t = lsp_max(t, next.y);
-        cell.y += gone_y ? -1 : 1;
-        out_of_node = uint(cell.y - base.y) >= un;
-        next.y = lsp_ntree_next(LSP_SCENE_ARG_ s, cell, ahead, size).y;
       } else {
-        t = lsp_max(t, next.z);
-        cell.z += gone_z ? -1 : 1;
-        out_of_node = uint(cell.z - base.z) >= un;
-        next.z = lsp_ntree_next(LSP_SCENE_ARG_ s, cell, ahead, size).z;
+        /* Out of a child the parent goes on along the same axis: its own planes may differ from the child's by a
+         * rounding, and that is any distance along a ray that is nearly parallel to them. */
+        if (visit) {
+          axis = next.x <= next.y ? (next.x <= next.z ? 0 : 2) : (next.y <= next.z ? 1 : 2);
+          t = lsp_max(t, axis == 0 ? next.x : (axis == 1 ? next.y : next.z));
+        }
+        int coordinate;
+        if (axis == 0) {
+          cell.x += gone_x ? -1 : 1;
+          coordinate = cell.x - base.x;
+          next.x = lsp_ntree_next(LSP_SCENE_ARG_ s, cell, ahead, size).x;
+        } else if (axis == 1) {
+          cell.y += gone_y ? -1 : 1;
+          coordinate = cell.y - base.y;
+          next.y = lsp_ntree_next(LSP_SCENE_ARG_ s, cell, ahead, size).y;
+        } else {
+          cell.z += gone_z ? -1 : 1;
+          coordinate = cell.z - base.z;
+          next.z = lsp_ntree_next(LSP_SCENE_ARG_ s, cell, ahead, size).z;
+        }
+        out_of_node = uint(coordinate) >= un;
       }
       visit = !out_of_node;
       bool passed = !far && (t > best.t || t > t_last);
