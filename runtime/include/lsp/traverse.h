@@ -59,7 +59,7 @@ struct LspCounts {
 struct LspSetup {
   vec3 origin;
   vec3 direction;
-  vec3 inverse;      /* 1 / direction; +-2^80 for components too small to matter */
+  vec3 inverse;      /* 1 / direction; 2^80 for components too small to matter */
   vec3 origin_plus;  /* origin + err: boxes are grown by moving the origin */
   vec3 origin_minus; /* origin - err */
   float err;         /* see the top of this file */
@@ -100,13 +100,14 @@ LSP_FN bool lsp_is_nan(float x) { return (floatBitsToUint(x) & 0x7FFFFFFFu) > 0x
 LSP_FN bool lsp_is_finite(float x) { return (floatBitsToUint(x) & 0x7F800000u) != 0x7F800000u; }
 LSP_FN bool lsp_all_finite(vec3 v) { return lsp_is_finite(v.x) && lsp_is_finite(v.y) && lsp_is_finite(v.z); }
 
-/* |d| under 2^-60 of the largest component cannot move a ray by an ulp of the scene: its slab is either hit
- * along its whole length or missed, and a finite reciprocal keeps 0 * infinity out of the arithmetic. */
+/* |d| under 2^-60 of the largest component cannot move a ray by an ulp of the scene: it is taken for zero, or
+ * products of it would underflow in the triangle test. Its slab is either hit along its whole length or missed,
+ * and a finite reciprocal keeps 0 * infinity out of the arithmetic. */
+LSP_FN float lsp_no_trifle(float d) { return abs(d) < 8.6736174e-19f ? 0.0f : d; }
+
 LSP_FN float lsp_reciprocal(float d) {
-  bool tiny = abs(d) < 8.6736174e-19f;
-  LSP_PRECISE float r = 1.0f / (tiny ? 1.0f : d);
-  float huge = (floatBitsToUint(d) & 0x80000000u) != 0u ? -1.2089258e24f : 1.2089258e24f;
-  return tiny ? huge : r;
+  LSP_PRECISE float r = 1.0f / (d == 0.0f ? 1.0f : d);
+  return d == 0.0f ? 1.2089258e24f : r;
 }
 
 /* Rotates the axes so that `axis` comes last; keeps their cyclic order. */
@@ -132,10 +133,14 @@ LSP_FN bool lsp_setup(LSP_SCENE_ LspRay ray, LSP_OUT(LspSetup) s) {
   s.to_scaled = uintBitsToFloat(exponent << 23u); /* 2^(exponent - 127) */
   s.axis = axis;
   s.origin = o;
-  s.direction = vec3(d.x * shrink, d.y * shrink, d.z * shrink);
+  s.direction = vec3(lsp_no_trifle(d.x * shrink), lsp_no_trifle(d.y * shrink), lsp_no_trifle(d.z * shrink));
   s.inverse = vec3(lsp_reciprocal(s.direction.x), lsp_reciprocal(s.direction.y), lsp_reciprocal(s.direction.z));
-  s.tmin = ray.tmin * s.to_scaled;
-  s.tmax = lsp_min(lsp_min(ray.tmax, LSP_FLOAT_MAX) * s.to_scaled, LSP_FLOAT_MAX);
+  /* A step of the denormals inside the interval: what is given back, rounded among them, must lie in it too. */
+  LSP_PRECISE float step = uintBitsToFloat(1u) * s.to_scaled;
+  LSP_PRECISE float first = ray.tmin * s.to_scaled + step;
+  LSP_PRECISE float last = lsp_min(ray.tmax, LSP_FLOAT_MAX) * s.to_scaled - step;
+  s.tmin = first;
+  s.tmax = lsp_min(last, LSP_FLOAT_MAX);
 
   vec3 lo = abs(LSP_LOAD3(LSP_HEADER.bounds_min) - o);
   vec3 hi = abs(LSP_LOAD3(LSP_HEADER.bounds_max) - o);
@@ -230,10 +235,11 @@ LSP_FN void lsp_triangle(LSP_SCENE_ LSP_IN(LspSetup) s, uint index, LSP_INOUT(Ls
   if (det == 0.0f || !lsp_is_finite(det)) return;
   float t = lsp_plane_depth(s, a, b, c);
   if (t > s.tmin && t < best.t) {
-    LSP_PRECISE float rcp = 1.0f / det;
     best.t = t;
-    best.u = v * rcp;
-    best.v = w * rcp;
+    LSP_PRECISE float weight1 = v / det; /* not by 1 / det: det may be so small that it is infinite */
+    LSP_PRECISE float weight2 = w / det;
+    best.u = weight1;
+    best.v = weight2;
     best.triangle = index;
     best.flags = 0u;
   }
