@@ -6,6 +6,7 @@
 #include "annotate.h"
 #include "mutations.h"
 #include "mutator.h"
+#include "ntree_scenes.h"
 #include "scenes.h"
 #include "summary.h"
 
@@ -37,16 +38,16 @@ TEST(Annotate, EveryByteOfTheCorpus) {
 }
 
 TEST(Annotate, EveryByteOfEveryPrefix) {
-  const Bytes bytes = encode(full_scene());
+  const Bytes bytes = encode(full_ntree_scene());
   for (size_t size = 0; size < bytes.size(); ++size)
     expect_all_accounted(Bytes(bytes.begin(), bytes.begin() + static_cast<ptrdiff_t>(size)),
                          std::to_string(size));
 }
 
 TEST(Annotate, EveryByteOfDamagedFiles) {
-  const Bytes good = encode(full_scene());
-  for (uint64_t seed = 0; seed < 5000; ++seed) {
-    Bytes bytes = good;
+  const Bytes good[] = {encode(full_scene()), encode(full_ntree_scene())};
+  for (uint64_t seed = 0; seed < 10000; ++seed) {
+    Bytes bytes = good[seed % 2];
     Random random(seed);
     mutate(bytes, random);
     expect_all_accounted(bytes, "seed " + std::to_string(seed));
@@ -86,9 +87,9 @@ TEST(Info, CountsOfTheTreeAddUp) {
 }
 
 TEST(Info, SummarisesDamagedFiles) {
-  const Bytes good = encode(full_scene());
-  for (uint64_t seed = 0; seed < 5000; ++seed) {
-    Bytes bytes = good;
+  const Bytes good[] = {encode(full_scene()), encode(full_ntree_scene())};
+  for (uint64_t seed = 0; seed < 10000; ++seed) {
+    Bytes bytes = good[seed % 2];
     Random random(seed);
     mutate(bytes, random);
     try {

@@ -5,6 +5,7 @@
 
 #include "check.h"
 #include "image.h"
+#include "ntree_scenes.h"
 #include "scenes.h"
 
 namespace {
@@ -18,8 +19,11 @@ Report check_exact(const Bytes& bytes, Level level = Level::kGeometry) {
   return check_file(Bytes(bytes), {.level = level, .memory_limit = uint64_t{1} << 26});
 }
 
+// Both base structures: every test below runs on the full scene of each.
+std::vector<Image> full_scenes() { return {full_scene(), full_ntree_scene()}; }
+
 TEST(Damage, EveryPrefixOfAValidFileIsRefused) {
-  for (const char* name : {"full", "packed"}) {
+  for (const char* name : {"full", "packed", "ntree-full", "ntree-packed"}) {
     for (const ValidFile& file : valid_files()) {
       if (file.name != name) continue;
       for (size_t size = 0; size < file.bytes.size(); ++size) {
@@ -35,12 +39,14 @@ TEST(Damage, EveryPrefixOfAValidFileIsRefused) {
 
 // The hashes cover every byte but padding, and padding is checked to be zero.
 TEST(Damage, EveryFlippedBitIsSeen) {
-  const Bytes good = encode(full_scene());
-  for (size_t at = 0; at < good.size(); ++at) {
-    Bytes bytes = good;
-    bytes[at] ^= static_cast<std::byte>(1 << at % 8);
-    const Report report = check_exact(bytes, Level::kContainer);
-    ASSERT_FALSE(report.findings().empty()) << "byte " << at;
+  for (const Image& scene : full_scenes()) {
+    const Bytes good = encode(scene);
+    for (size_t at = 0; at < good.size(); ++at) {
+      Bytes bytes = good;
+      bytes[at] ^= static_cast<std::byte>(1 << at % 8);
+      const Report report = check_exact(bytes, Level::kContainer);
+      ASSERT_FALSE(report.findings().empty()) << "byte " << at;
+    }
   }
 }
 
@@ -55,33 +61,39 @@ TEST(Damage, ExtraBytesAreRefused) {
 // Every 32-bit word of header and table, and every 64-bit field, set to extremes, with and without the hashes
 // made right again: nothing may fault, and what changed a meaning may not pass unseen.
 TEST(Damage, ExtremeValuesInHeaderAndTable) {
-  const Bytes good = encode(full_scene());
-  const size_t end = sizeof(LspHeader) + 8 * sizeof(LspSection);
-  for (size_t at = 0; at + 8 <= end; at += 4)
-    for (uint64_t value :
-         {uint64_t{0}, uint64_t{1}, uint64_t{0x7FFFFFFF}, uint64_t{0x80000000}, uint64_t{0xFFFFFFFF},
-          ~uint64_t{0}, ~uint64_t{255}, uint64_t{1} << 63, uint64_t{1} << 58})
-      for (size_t width : {4, 8})
-        for (bool repaired : {false, true}) {
-          Bytes bytes = good;
-          std::memcpy(bytes.data() + at, &value, width);
-          if (repaired) repair_hashes(bytes);
-          if (bytes == good) continue;
-          const Report report = check_exact(bytes);
-          ASSERT_TRUE(repaired || report.verdict() != Verdict::kValid) << at << " " << value << " " << width;
-        }
+  for (const Image& scene : full_scenes()) {
+    Bytes good = encode(scene);
+    const size_t end = sizeof(LspHeader) + table_of(good).size() * sizeof(LspSection);
+    for (size_t at = 0; at + 8 <= end; at += 4)
+      for (uint64_t value :
+           {uint64_t{0}, uint64_t{1}, uint64_t{0x7FFFFFFF}, uint64_t{0x80000000}, uint64_t{0xFFFFFFFF},
+            ~uint64_t{0}, ~uint64_t{255}, uint64_t{1} << 63, uint64_t{1} << 58})
+        for (size_t width : {4, 8})
+          for (bool repaired : {false, true}) {
+            Bytes bytes = good;
+            std::memcpy(bytes.data() + at, &value, width);
+            if (repaired) repair_hashes(bytes);
+            if (bytes == good) continue;
+            const Report report = check_exact(bytes);
+            ASSERT_TRUE(repaired || report.verdict() != Verdict::kValid)
+                << at << " " << value << " " << width;
+          }
+  }
 }
 
 // The same over the sections: any word of any section.
 TEST(Damage, ExtremeValuesInSections) {
-  const Bytes good = encode(full_scene());
-  for (size_t at = sizeof(LspHeader) + 8 * sizeof(LspSection); at + 4 <= good.size(); at += 4)
-    for (uint32_t value : {0u, 1u, 0x7F800000u, 0x7FC00000u, 0x80000000u, 0xFFFFFFFFu}) {
-      Bytes bytes = good;
-      std::memcpy(bytes.data() + at, &value, 4);
-      repair_hashes(bytes);
-      check_exact(bytes);
-    }
+  for (const Image& scene : full_scenes()) {
+    Bytes good = encode(scene);
+    const size_t first = sizeof(LspHeader) + table_of(good).size() * sizeof(LspSection);
+    for (size_t at = first; at + 4 <= good.size(); at += 4)
+      for (uint32_t value : {0u, 1u, 0x7F800000u, 0x7FC00000u, 0x80000000u, 0xFFFFFFFFu}) {
+        Bytes bytes = good;
+        std::memcpy(bytes.data() + at, &value, 4);
+        repair_hashes(bytes);
+        check_exact(bytes);
+      }
+  }
 }
 
 TEST(Damage, ZeroCounts) {
@@ -98,44 +110,53 @@ TEST(Damage, ZeroCounts) {
 }
 
 TEST(Damage, SwappedSections) {
-  const Sections good = to_sections(full_scene());
-  for (size_t a = 0; a < good.sections.size(); ++a)
-    for (size_t b = a + 1; b < good.sections.size(); ++b) {
-      Sections swapped = good;
-      std::swap(swapped.sections[a], swapped.sections[b]);
-      EXPECT_TRUE(check_exact(encode(swapped)).has(RuleId::kSectionOrder)) << a << " " << b;
-      Bytes bytes = encode(good);
-      std::swap(table_of(bytes)[a].offset, table_of(bytes)[b].offset);
-      repair_hashes(bytes);
-      EXPECT_NE(check_exact(bytes).verdict(), Verdict::kValid) << a << " " << b;
-    }
+  for (const Image& scene : full_scenes()) {
+    const Sections good = to_sections(scene);
+    for (size_t a = 0; a < good.sections.size(); ++a)
+      for (size_t b = a + 1; b < good.sections.size(); ++b) {
+        Sections swapped = good;
+        std::swap(swapped.sections[a], swapped.sections[b]);
+        EXPECT_TRUE(check_exact(encode(swapped)).has(RuleId::kSectionOrder)) << a << " " << b;
+        Bytes bytes = encode(good);
+        std::swap(table_of(bytes)[a].offset, table_of(bytes)[b].offset);
+        repair_hashes(bytes);
+        EXPECT_NE(check_exact(bytes).verdict(), Verdict::kValid) << a << " " << b;
+      }
+  }
 }
 
 TEST(Damage, EveryPairOfSectionsOverlapping) {
-  const Bytes good = encode(full_scene());
-  for (size_t a = 0; a < 8; ++a)
-    for (size_t b = 0; b < 8; ++b) {
-      if (a == b) continue;
-      Bytes bytes = good;
-      table_of(bytes)[a].offset = table_of(bytes)[b].offset;
-      repair_hashes(bytes);
-      // A long section moved to the place of the last one ends behind the file instead.
-      const Report report = check_exact(bytes);
-      EXPECT_TRUE(report.has(RuleId::kSectionOverlap) || report.has(RuleId::kSectionOutside))
-          << a << " " << b;
-    }
+  for (const Image& scene : full_scenes()) {
+    const Bytes good = encode(scene);
+    const size_t sections = to_sections(scene).sections.size();
+    for (size_t a = 0; a < sections; ++a)
+      for (size_t b = 0; b < sections; ++b) {
+        if (a == b) continue;
+        Bytes bytes = good;
+        table_of(bytes)[a].offset = table_of(bytes)[b].offset;
+        repair_hashes(bytes);
+        // A long section moved to the place of the last one ends behind the file instead.
+        const Report report = check_exact(bytes);
+        EXPECT_TRUE(report.has(RuleId::kSectionOverlap) || report.has(RuleId::kSectionOutside))
+            << a << " " << b;
+      }
+  }
 }
 
 // A section that is misaligned and counted wrong at once must not be read in place.
 TEST(Damage, MisalignedSections) {
-  for (size_t section = 0; section < 8; ++section)
-    for (bool counted : {true, false}) {
-      Bytes bytes = encode(full_scene());
-      table_of(bytes)[section].offset -= 1;
-      if (!counted) header_of(bytes).line_space_count = header_of(bytes).node_count = 0;
-      repair_hashes(bytes);
-      EXPECT_TRUE(check_exact(bytes).has(RuleId::kSectionMisaligned)) << section;
-    }
+  for (const Image& scene : full_scenes())
+    for (size_t section = 0; section < to_sections(scene).sections.size(); ++section)
+      for (bool counted : {true, false}) {
+        Bytes bytes = encode(scene);
+        table_of(bytes)[section].offset -= 1;
+        if (!counted) {
+          LspHeader& h = header_of(bytes);
+          h.line_space_count = h.node_count = h.cell_count = h.reference_count = 0;
+        }
+        repair_hashes(bytes);
+        EXPECT_TRUE(check_exact(bytes).has(RuleId::kSectionMisaligned)) << section;
+      }
 }
 
 TEST(Damage, OffsetsNearTheEndOfTheNumbers) {
@@ -176,6 +197,50 @@ TEST(Damage, AChainOfAMillionNodes) {
   image.nodes.back().child0 = LSP_LEAF_BIT;
   const Report report = check_exact(encode(image));
   EXPECT_TRUE(report.has(RuleId::kDepthExceeded));
+}
+
+// The same of an NTree: nodes below nodes, each in the only cell of the one before it.
+TEST(Damage, AnNTreeOfAMillionLevels) {
+  Image image = full_ntree_scene();
+  image.line_spaces.clear();
+  image.words.clear();
+  image.candidates.clear();
+  image.references.clear();
+  image.grid.clear();
+  image.cells.clear();
+  for (uint32_t i = 0; i < 1000000; ++i) {
+    image.grid.push_back({1, i});
+    image.cells.push_back({i + 1, 0, LSP_NONE});
+  }
+  image.cells.back() = {LSP_LEAF_BIT, 0, LSP_NONE};
+  EXPECT_TRUE(check_exact(encode(image)).has(RuleId::kNtreeTooDeep));
+}
+
+// Many leaves over the same references: told from the cells, without looking into the references of each.
+TEST(Damage, ManyLeavesOverTheSameReferences) {
+  Image image = ntree_scene({.branching = 16, .levels = 1});
+  image.grid.resize(128 * 200);
+  for (uint32_t w = 0; w < image.grid.size(); ++w) image.grid[w] = {~0u, w * 32};
+  image.references.assign(300000, 0);
+  image.cells.assign(4096 * 200, {LSP_LEAF_BIT, 300000, LSP_NONE});
+  image.header.max_leaf_triangles = 300000;
+  EXPECT_TRUE(check_exact(encode(image)).has(RuleId::kReferencesNotCumulative));
+}
+
+// Triangles that no leaf holds, each reaching into every node of a large tree: one walk into one node tells.
+TEST(Damage, TrianglesEverywhereThatNoLeafHolds) {
+  Image image = ntree_scene({.branching = 16, .levels = 2, .leaf_triangles = 1});
+  LspTriangle wide = image.triangles[0];
+  for (lsp_float3* v : {&wide.v0, &wide.v1, &wide.v2}) v->y = image.header.ntree_lo.y + 1.0f;
+  const size_t before = image.triangles.size();
+  for (uint32_t i = 0; i < 20000; ++i) {
+    wide.primitive = static_cast<uint32_t>(image.triangles.size());
+    image.triangles.push_back(wide);
+  }
+  image.header.primitive_count = image.triangles.size();
+  const Report report = check_exact(encode(image));
+  ASSERT_TRUE(report.has(RuleId::kCellLacksTriangle));
+  EXPECT_EQ(report.findings().at(RuleId::kCellLacksTriangle).count, image.triangles.size() - before);
 }
 
 }  // namespace
