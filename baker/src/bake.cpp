@@ -1,5 +1,8 @@
 #include "bake.h"
 
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -69,20 +72,48 @@ void set_base(const NTree& ntree, LspHeader& h) {
   h.ntree_margin = ntree.margin;
 }
 
-// The bake's largest arrays at their largest: the mesh, the tree with its references in flight, the sections.
-uint64_t estimate_bytes(const Mesh& mesh, const BakeOptions& options) {
+// The bake's largest arrays at their largest.
+struct Estimate {
+  uint64_t scene;        // the program, the mesh, the tree with its references in flight, the sections
+  uint64_t line_spaces;  // all of them
+  uint64_t in_flight;    // Line Spaces that are being filled, whatever their number
+};
+
+Estimate estimate_bytes(const Mesh& mesh, const BakeOptions& options, uint64_t batch_bytes) {
+  constexpr uint64_t kProgram = 16u << 20;
   const uint64_t triangles = mesh.triangles.size();
   const uint64_t input = mesh.positions.size() * 12 + triangles * (12 + 4 + 36 + 4);
   const uint64_t tree = triangles * (32 * 3 + 120) + triangles * (64 + 48 * 2 + 12);
-  uint64_t line_spaces = 0;
-  if (options.line_spaces) {
-    uint64_t sites = 0;
-    for (uint32_t d : options.line_space.depths)
-      sites += std::min<uint64_t>(1ull << std::min(d, 40u), triangles / 4 + 1);
-    const uint64_t n = options.line_space.resolution;
-    line_spaces = sites * 30 * n * n * n * n * 5 / 2;
+  if (!options.line_spaces) return {kProgram + input + tree, 0, 0};
+  uint64_t sites = 0;
+  const uint64_t b = options.ntree.branching;
+  for (uint32_t d : options.line_space.depths) {
+    const uint64_t nodes =
+        options.base == Base::kNTree ? (d < 2 ? (d ? b * b * b : 1) : 1ull << 40) : 1ull << std::min(d, 40u);
+    sites += std::min<uint64_t>(nodes, triangles / 4 + 1);
   }
-  return input + tree + line_spaces;
+  const uint64_t n = options.line_space.resolution, shafts = 30 * n * n * n * n;
+  const uint64_t threads =
+      std::min(uint64_t(tbb::this_task_arena::max_concurrency()),
+               uint64_t(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism)));
+  return {kProgram + input + tree, sites * shafts * 5 / 2,
+          std::min(sites * shafts * 5, batch_bytes) + threads * shafts * 10};
+}
+
+// Decides where the Line Spaces are kept so that the memory limit holds.
+void plan_memory(const Mesh& mesh, BakeOptions& options) {
+  if (!options.memory_limit) return;
+  const uint64_t limit = options.memory_limit;
+  options.line_space.batch_bytes = std::min(options.line_space.batch_bytes, limit / 8);
+  const Estimate e = estimate_bytes(mesh, options, options.line_space.batch_bytes);
+  const bool spill = e.scene + e.line_spaces + e.in_flight > limit && !options.folder.empty();
+  if (spill) options.line_space.folder = options.folder;
+  const uint64_t needed = e.scene + e.in_flight + (spill ? 0 : e.line_spaces);
+  if (needed > limit)
+    throw Failure(Exit::kLimit, "",
+                  "the bake needs about " + with_commas(needed >> 20) + " MiB, over the limit of " +
+                      with_commas(limit >> 20) +
+                      " MiB: raise --memory-limit, or lower --depth or --resolution");
 }
 
 }  // namespace
@@ -111,15 +142,9 @@ void set_counts(Baked& baked) {
     h.max_steps = 3 * h.ntree_branching * h.node_count + h.cell_count + h.reference_count;
 }
 
-Baked bake(const Mesh& mesh, const BakeOptions& options, const Progress& progress) {
-  if (options.memory_limit) {
-    const uint64_t needed = estimate_bytes(mesh, options);
-    if (needed > options.memory_limit)
-      throw Failure(Exit::kLimit, "",
-                    "the bake needs about " + with_commas(needed >> 20) + " MiB, over the limit of " +
-                        with_commas(options.memory_limit >> 20) +
-                        " MiB: raise --memory-limit, or lower --depth or --resolution");
-  }
+Baked bake(const Mesh& mesh, const BakeOptions& asked, const Progress& progress) {
+  BakeOptions options = asked;
+  plan_memory(mesh, options);
   const auto stage = [&](const char* name) {
     return [&progress, name](double done) {
       if (progress) progress(name, done);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <string>
 #include <string_view>
@@ -36,6 +37,8 @@ struct BakeOptions {
   float plane_tolerance = 0.0f;         // LspHeader.plane_tolerance
   float normal_angle_degrees = 180.0f;  // LspHeader.normal_angle_cos; 180: no hit is rejected
   uint64_t memory_limit = 0;            // bytes, 0: none
+  std::filesystem::path
+      folder;  // where Line Spaces that the limit has no room for go meanwhile; empty: nowhere
 };
 
 // The sections of a file, and the header but for what the writer knows (sizes, offsets, hashes).

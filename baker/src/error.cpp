@@ -101,6 +101,8 @@ MeasuredError measure_error(const Baked& baked, uint64_t rays) {
     const lsp_trace_options exact_options = {0, 0}, approximate_options = {LSP_TRACE_APPROXIMATE, 0};
     lsp_trace(&scene, &exact_options, batch.data(), exact.data(), batch.size(), nullptr, nullptr);
     lsp_trace(&scene, &approximate_options, batch.data(), approximate.data(), batch.size(), nullptr, nullptr);
+    baked.line_spaces.words.release();
+    baked.line_spaces.candidates.release();
     for (size_t i = 0; i < batch.size(); ++i) {
       const bool truth = exact[i].primitive != LSP_NONE, answer = approximate[i].primitive != LSP_NONE;
       parts[p].wrong_hits += answer && !truth;

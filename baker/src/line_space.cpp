@@ -19,6 +19,8 @@ lsp_float3 f3(const glm::vec3& v) { return {v.x, v.y, v.z}; }
 constexpr uint32_t kFirstSamples = 3;
 constexpr float kSettled = 0.01f;  // mean error, in lengths of the shaft, under which a plane is good enough
 
+constexpr uint64_t kBytesPerShaft = 5;  // an entry and its part of a bit word
+
 // One Line Space before it finds its place in the file.
 struct Filled {
   LspLineSpace record;
@@ -250,20 +252,28 @@ LineSpaces fill_line_spaces(const Bvh& bvh, const LspHeader& header, std::span<c
   std::vector<LspTriangle> numbered(triangles.begin(), triangles.end());
   for (size_t i = 0; i < numbered.size(); ++i) numbered[i].primitive = uint32_t(i);
 
-  std::vector<Filled> filled(sites.size());
-  std::atomic<size_t> done{0};
-  tbb::parallel_for(size_t(0), sites.size(), [&](size_t i) {
-    filled[i] = Filler(bvh, header, numbered, sites[i], options).run();
-    const size_t now = ++done;
-    if (progress && now % 16 == 0) progress(double(now) / double(sites.size()));
-  });
-
   LineSpaces all;
+  if (!options.folder.empty()) {
+    all.words.keep_in_file(options.folder);
+    all.candidates.keep_in_file(options.folder);
+  }
   const uint32_t n = options.resolution;
   const uint64_t shafts = (options.kind == LineSpaceKind::kBinary ? 15ull : 30ull) * n * n * n * n;
   references.assign(sites.size(), LSP_NONE);
+  // A batch at a time, so that no more than one is in memory twice.
+  const size_t batch_sites = size_t(std::max<uint64_t>(2, options.batch_bytes / (shafts * kBytesPerShaft)));
+  std::vector<Filled> filled(std::min(batch_sites, sites.size()));
+  std::atomic<size_t> done{0};
   for (size_t i = 0; i < sites.size(); ++i) {
-    Filled& f = filled[i];
+    if (i % batch_sites == 0) {
+      const size_t end = std::min(i + batch_sites, sites.size());
+      tbb::parallel_for(i, end, [&](size_t k) {
+        filled[k - i] = Filler(bvh, header, numbered, sites[k], options).run();
+        const size_t now = ++done;
+        if (progress && now % 16 == 0) progress(double(now) / double(sites.size()));
+      });
+    }
+    Filled& f = filled[i % batch_sites];
     if (f.record.filled == 0) {
       ++all.dropped;
       continue;
@@ -274,8 +284,8 @@ LineSpaces fill_line_spaces(const Bvh& bvh, const LspHeader& header, std::span<c
                     "the Line Spaces need more than 2^32 words, lower --resolution or --depth");
     f.record.word_first = f.words.empty() ? 0 : uint32_t(all.words.size());
     f.record.candidate_first = f.candidates.empty() ? 0 : uint32_t(all.candidates.size());
-    all.words.insert(all.words.end(), f.words.begin(), f.words.end());
-    all.candidates.insert(all.candidates.end(), f.candidates.begin(), f.candidates.end());
+    all.words.append(f.words);
+    all.candidates.append(f.candidates);
     all.shafts += shafts;
     all.filled += f.record.filled;
     all.dense += (f.record.format & LSP_FORMAT_DENSE) ? 1 : 0;

@@ -5,11 +5,13 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <span>
 #include <vector>
 
 #include "bvh.h"
+#include "large_array.h"
 #include "lsp/layout.h"
 
 namespace lsp {
@@ -26,7 +28,10 @@ struct LineSpaceOptions {
   // Rays per shaft that choose its candidate: 1 is the paper's centroid ray, more pick the triangle (or none)
   // whose plane answers all of them best.
   uint32_t samples = 5;
-  uint32_t triangles = 0;  // T: so does a node above the last depth with fewer triangles than this
+  // Not empty: words and candidates lie in temporary files in this folder.
+  std::filesystem::path folder;
+  uint64_t batch_bytes = 64u << 20;  // filled Line Spaces that are held besides, about
+  uint32_t triangles = 0;            // T: so does a node above the last depth with fewer triangles than this
 };
 
 constexpr size_t kNoSite = SIZE_MAX;
@@ -48,9 +53,9 @@ struct LineSpaceSite {
 
 struct LineSpaces {
   std::vector<LspLineSpace> records;
-  std::vector<LspBitWord> words;
-  std::vector<uint32_t> candidates;  // entries packed into words
-  uint64_t shafts = 0;               // of all Line Spaces
+  LargeArray<LspBitWord> words;
+  LargeArray<uint32_t> candidates;  // entries packed into words
+  uint64_t shafts = 0;              // of all Line Spaces
   uint64_t filled = 0;
   uint64_t dense = 0;    // Line Spaces in the dense layout
   uint64_t dropped = 0;  // sites whose Line Space had no filled shaft

@@ -185,6 +185,7 @@ Exit run(Arguments a) {
   options.normal_angle_degrees = a.normal_angle;
   options.plane_tolerance = a.plane_tolerance;
   options.memory_limit = a.memory_limit;
+  options.folder = a.output.has_parent_path() ? a.output.parent_path() : ".";
   const auto bake_with = [&](const Arguments& with) {
     options.line_space.resolution = with.resolution;
     options.line_space.depths = with.depths;
@@ -227,7 +228,8 @@ Exit run(Arguments a) {
 
   bar.show("write", 0);
   const Json meta = provenance(a, mesh, source, error);
-  const Written written = write_lsp(a.output, baked, meta.dump(), {a.align, a.compress == "zstd", 12});
+  const Written written =
+      write_lsp(a.output, baked, meta.dump(), {a.align, a.compress == "zstd", 12, a.memory_limit});
   const double write_seconds = timer();
   bar.clear();
 

@@ -6,8 +6,10 @@
 #include <xxhash.h>
 #include <zstd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <functional>
 #include <memory>
 #include <span>
 
@@ -22,11 +24,33 @@ struct Section {
   uint32_t element_bytes;
   bool required;
   std::span<const std::byte> bytes;
+  std::function<void()> release;  // after reading a piece of `bytes`; may be empty
   std::vector<std::byte> packed;
   std::span<const std::byte> stored() const {
     return packed.empty() ? bytes : std::span<const std::byte>(packed);
   }
 };
+
+// Hands the section's bytes to `f` piece by piece, so that a section in a file need not be in memory as a
+// whole.
+template <typename F>
+void for_each_piece(std::span<const std::byte> bytes, const std::function<void()>& release, F&& f) {
+  constexpr size_t kPiece = size_t{16} << 20;
+  for (size_t done = 0; done < bytes.size(); done += kPiece) {
+    f(bytes.subspan(done, std::min(kPiece, bytes.size() - done)));
+    if (release) release();
+  }
+}
+
+XXH128_hash_t hash_of(const Section& s) {
+  const std::unique_ptr<XXH3_state_t, XXH_errorcode (*)(XXH3_state_t*)> state(XXH3_createState(),
+                                                                              XXH3_freeState);
+  XXH3_128bits_reset(state.get());
+  for_each_piece(s.bytes, s.release, [&](std::span<const std::byte> piece) {
+    XXH3_128bits_update(state.get(), piece.data(), piece.size());
+  });
+  return XXH3_128bits_digest(state.get());
+}
 
 uint64_t align_up(uint64_t x, uint64_t alignment) { return (x + alignment - 1) / alignment * alignment; }
 
@@ -115,7 +139,7 @@ Written write_lsp(const std::filesystem::path& path, Baked& baked, const std::st
                        const void* data, size_t bytes) {
     if (bytes == 0) return;
     sections.push_back(
-        {name, type, element_bytes, required, {static_cast<const std::byte*>(data), bytes}, {}});
+        {name, type, element_bytes, required, {static_cast<const std::byte*>(data), bytes}, {}, {}});
   };
   const auto add_vector = [&](const char* name, uint32_t type, bool required, const auto& v) {
     add(name, type, uint32_t(sizeof v[0]), required, v.data(), v.size() * sizeof v[0]);
@@ -125,8 +149,12 @@ Written write_lsp(const std::filesystem::path& path, Baked& baked, const std::st
   add_vector("NRML", LSP_SECTION_NRML, true, baked.normals);
   add_vector("MATL", LSP_SECTION_MATL, true, baked.materials);
   add_vector("LSPC", LSP_SECTION_LSPC, true, baked.line_spaces.records);
-  add_vector("BITS", LSP_SECTION_BITS, true, baked.line_spaces.words);
-  add_vector("CAND", LSP_SECTION_CAND, true, baked.line_spaces.candidates);
+  const auto add_large = [&](const char* name, uint32_t type, const auto& v) {
+    add_vector(name, type, true, v);
+    if (!v.empty()) sections.back().release = [&v] { v.release(); };
+  };
+  add_large("BITS", LSP_SECTION_BITS, baked.line_spaces.words);
+  add_large("CAND", LSP_SECTION_CAND, baked.line_spaces.candidates);
   add_vector("GRID", LSP_SECTION_GRID, true, baked.ntree.grid);
   add_vector("CELL", LSP_SECTION_CELL, true, baked.ntree.cells);
   add_vector("REFS", LSP_SECTION_REFS, true, baked.ntree.references);
@@ -135,6 +163,11 @@ Written write_lsp(const std::filesystem::path& path, Baked& baked, const std::st
   bool any_packed = false;
   if (options.zstd)
     for (Section& s : sections) {
+      if (options.memory_limit && s.bytes.size() > options.memory_limit / 2)
+        throw Failure(
+            Exit::kLimit, "",
+            std::string("packing section ") + s.name + " of " + std::to_string(s.bytes.size() >> 20) +
+                " MiB needs more memory than --memory-limit leaves: raise it, or leave out --compress");
       s.packed = compress(s.bytes, options.zstd_level);
       if (s.packed.size() >= s.bytes.size()) s.packed.clear();
       any_packed |= !s.packed.empty();
@@ -156,7 +189,7 @@ Written write_lsp(const std::filesystem::path& path, Baked& baked, const std::st
   std::vector<ContentEntry> content;
   uint64_t position = sizeof(LspHeader) + sections.size() * sizeof(LspSection);
   for (const Section& s : sections) {
-    const XXH128_hash_t hash = XXH3_128bits(s.bytes.data(), s.bytes.size());
+    const XXH128_hash_t hash = hash_of(s);
     const uint64_t count = s.bytes.size() / s.element_bytes;
     position = align_up(position, alignment);
     table.push_back({s.type, s.required ? LSP_SECTION_REQUIRED : 0u, position, s.stored().size(),
@@ -183,7 +216,8 @@ Written write_lsp(const std::filesystem::path& path, Baked& baked, const std::st
   Written written{h.file_bytes, {}};
   for (size_t i = 0; i < sections.size(); ++i) {
     file.pad_to(table[i].offset);
-    file.write(sections[i].stored().data(), sections[i].stored().size());
+    for_each_piece(sections[i].stored(), sections[i].release,
+                   [&](std::span<const std::byte> piece) { file.write(piece.data(), piece.size()); });
     written.sections.push_back({sections[i].name, sections[i].bytes.size(), sections[i].stored().size()});
   }
   file.pad_to(h.file_bytes);

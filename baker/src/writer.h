@@ -14,6 +14,7 @@ struct WriteOptions {
   uint32_t alignment = 4096;  // 256, 4096 or 65536
   bool zstd = false;          // pack the sections; a packed file cannot be mapped, only unpacked
   int zstd_level = 12;
+  uint64_t memory_limit = 0;  // for packing, which holds a section and its packed form; 0: none
 };
 
 struct WrittenSection {
@@ -29,7 +30,8 @@ struct Written {
 
 // Completes `baked.header` (sizes, offsets, hashes) and writes the file. It is written beside `path` under
 // another name, synced and renamed: an interrupted or failed write leaves an older file at `path` whole.
-// `meta` is the provenance, UTF-8 JSON. Throws Failure with Exit::kFile.
+// `meta` is the provenance, UTF-8 JSON. Throws Failure with Exit::kFile, or
+// Exit::kLimit.
 Written write_lsp(const std::filesystem::path& path, Baked& baked, const std::string& meta,
                   const WriteOptions& options);
 

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 
 #include "bake.h"
 #include "error.h"
@@ -187,6 +188,48 @@ TEST(LineSpaces, BakeWithinAMemoryLimitOrSaySo) {
   BakeOptions options = small(6, {9});
   options.memory_limit = 1 << 20;
   EXPECT_THROW(bake(sphere(60), options), Failure);
+}
+
+TEST(LineSpaces, AreTheSameWhereTheyDoNotFitIntoMemory) {
+  BakeOptions options = small(6, {5});
+  const Baked whole = bake(sphere(24), options);
+  options.folder = std::filesystem::temp_directory_path();
+  const tbb::global_control two(tbb::global_control::max_allowed_parallelism, 2);
+  options.memory_limit = 22u << 20;  // 16 MiB of it for the program
+  const Baked spilled = bake(sphere(24), options);
+  const auto same = [](const auto& a, const auto& b) {
+    return a.size() == b.size() && memcmp(a.data(), b.data(), a.size() * sizeof a[0]) == 0;
+  };
+  EXPECT_TRUE(same(whole.line_spaces.words, spilled.line_spaces.words));
+  EXPECT_TRUE(same(whole.line_spaces.candidates, spilled.line_spaces.candidates));
+  EXPECT_TRUE(same(whole.line_spaces.records, spilled.line_spaces.records));
+}
+
+TEST(LargeArray, GrowsInMemoryAndInAFile) {
+  for (const bool in_file : {false, true}) {
+    LargeArray<uint32_t> array;
+    if (in_file) array.keep_in_file(std::filesystem::temp_directory_path());
+    EXPECT_TRUE(array.empty());
+    std::vector<uint32_t> piece(100000);
+    for (uint32_t i = 0; i < 30; ++i) {
+      for (uint32_t j = 0; j < piece.size(); ++j) piece[j] = i * 100000 + j;
+      array.append(piece);
+    }
+    array[7] = 70;
+    array.release();
+    ASSERT_EQ(array.size(), 3000000u);
+    EXPECT_EQ(array[7], 70u);
+    EXPECT_EQ(array[2999999], 2999999u);
+    const LargeArray<uint32_t> moved = std::move(array);
+    EXPECT_EQ(moved[1234567], 1234567u);
+  }
+  LargeArray<uint32_t> array;
+  try {
+    array.keep_in_file("/nonexistent");
+    FAIL();
+  } catch (const Failure& f) {
+    EXPECT_EQ(f.exit(), Exit::kFile);
+  }
 }
 
 }  // namespace

@@ -191,6 +191,7 @@ TEST(NTree, AnswersApproximatelyWithoutItsExactPart) {
   options.base = Base::kNTree;
   options.ntree.branching = 6;
   options.line_space.depths = {1};
+  options.line_space.resolution = 2;
   Baked baked = bake(sphere(30), options);
   const std::vector<LspRay> rays = rays_about(baked, 5000, 1.5f);
   const uint32_t flags = LSP_TRACE_APPROXIMATE | LSP_TRACE_NEAR_APPROXIMATE;
