@@ -2,8 +2,8 @@
 //
 // The bytes may be hostile. No count, offset or size of the file is used before it was checked against the
 // bytes that are there; memory used beyond the file is at most `memory_limit` for unpacked sections, some 30
-// bytes a node of a damaged tree and, at the level geometry, some 30 bytes a triangle. Nothing is written, no
-// thread is started.
+// bytes a node of a damaged tree, some 20 bytes a triangle of an NTree and, at the level geometry, some 30
+// bytes a triangle and a node of an NTree. Nothing is written, no thread is started.
 #pragma once
 
 #include <cstddef>

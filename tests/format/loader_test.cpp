@@ -7,6 +7,7 @@
 
 #include "check.h"
 #include "mutations.h"
+#include "ntree_scenes.h"
 #include "opened.h"
 #include "scenes.h"
 
@@ -96,17 +97,17 @@ TEST(Loader, AgreesOnTenThousandRandomMutations) {
 }
 
 TEST(Loader, UnpackOfPackIsTheSameFile) {
-  for (uint32_t alignment : {256u, 4096u, 65536u}) {
-    Image image = full_scene();
-    image.alignment = alignment;
-    const Bytes raw = encode(image);
-    Sections sections = to_sections(image);
-    pack(sections);
-    Opened opened = open(encode(sections));
-    ASSERT_EQ(opened.status, LSP_OK) << opened.error.message;
-    ASSERT_EQ(opened.bytes->size(), raw.size());
-    EXPECT_EQ(std::memcmp(opened.bytes->data(), raw.data(), raw.size()), 0) << alignment;
-  }
+  for (Image image : {full_scene(), full_ntree_scene()})
+    for (uint32_t alignment : {256u, 4096u, 65536u}) {
+      image.alignment = alignment;
+      const Bytes raw = encode(image);
+      Sections sections = to_sections(image);
+      pack(sections);
+      Opened opened = open(encode(sections));
+      ASSERT_EQ(opened.status, LSP_OK) << opened.error.message;
+      ASSERT_EQ(opened.bytes->size(), raw.size());
+      EXPECT_EQ(std::memcmp(opened.bytes->data(), raw.data(), raw.size()), 0) << alignment;
+    }
 }
 
 }  // namespace
