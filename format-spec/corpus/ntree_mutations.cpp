@@ -13,6 +13,8 @@ using format::RuleId;
 
 void header_and_table(Collector& c) {
   c.ntree_header(RuleId::kMaxStack, "max_stack of an NTree is 97", [](LspHeader& h) { h.max_stack = 97; });
+  c.ntree_header(RuleId::kMaxLeaf, "max_leaf_triangles of an NTree is more than there are references",
+                 [](LspHeader& h) { h.max_leaf_triangles = h.reference_count + 1; });
   c.ntree_header(RuleId::kRootReference, "the root of an NTree is a leaf",
                  [](LspHeader& h) { h.root = LSP_LEAF_BIT; });
   c.ntree_header(RuleId::kNtreeParameters, "ntree_branching is 17",

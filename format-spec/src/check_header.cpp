@@ -129,9 +129,12 @@ void check_limits(const LspHeader& header, Report& report) {
     LSP_HEADER_FINDING(
         kStepsBound, max_steps,
         "is " + std::to_string(header.max_steps) + " for " + std::to_string(header.node_count) + " nodes");
-  if (header.max_leaf_triangles > LSP_MAX_LEAF_TRIANGLES && !is_ntree(header))
-    LSP_HEADER_FINDING(kMaxLeaf, max_leaf_triangles,
-                       "is " + std::to_string(header.max_leaf_triangles) + ", the limit is 16");
+  // What a leaf's loop may run to, before anybody has looked at the leaf.
+  const uint32_t most = is_ntree(header) ? header.reference_count : LSP_MAX_LEAF_TRIANGLES;
+  if (header.max_leaf_triangles > most)
+    LSP_HEADER_FINDING(
+        kMaxLeaf, max_leaf_triangles,
+        "is " + std::to_string(header.max_leaf_triangles) + ", the limit is " + std::to_string(most));
   if (header.section_count > kMaxSections)
     LSP_HEADER_FINDING(
         kSectionCount, section_count,

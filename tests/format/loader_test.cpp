@@ -4,6 +4,7 @@
 #include <lsp/lsp.h>
 
 #include <cstring>
+#include <set>
 
 #include "check.h"
 #include "mutations.h"
@@ -72,6 +73,24 @@ TEST(Loader, AgreesOnTheCorpus) {
   for (const ValidFile& file : valid_files()) expect_agreement(file.bytes, file.name, valid, opened);
   EXPECT_EQ(valid, valid_files().size());
   for (const InvalidFile& file : invalid_files()) expect_agreement(file.bytes, file.name, valid, opened);
+}
+
+// What SPEC.md says a reader must refuse before it follows a reference. Each bounds a loop, a stack or a
+// range: a file that opened with more could keep a tracer, or a device, busy for as long as it likes.
+TEST(Loader, RefusesWhatAReaderMustRefuse) {
+  const std::set<RuleId> rules = {
+      RuleId::kTooShort,        RuleId::kBadMagic,     RuleId::kOtherMajor,     RuleId::kUnknownRequired,
+      RuleId::kHeaderBytes,     RuleId::kTableOffset,  RuleId::kTableOutside,   RuleId::kTruncated,
+      RuleId::kExtraBytes,      RuleId::kAlignment,    RuleId::kMaxStack,       RuleId::kMaxLeaf,
+      RuleId::kNtreeParameters, RuleId::kAddressable,  RuleId::kStepsBound,     RuleId::kSectionOutside,
+      RuleId::kSectionOverlap,  RuleId::kElementCount, RuleId::kMissingSection, RuleId::kCountDiffers};
+  size_t count = 0;
+  for (const InvalidFile& file : invalid_files()) {
+    if (!rules.contains(file.rule)) continue;
+    EXPECT_NE(open(file.bytes).status, LSP_OK) << file.name << ": " << file.mutation;
+    ++count;
+  }
+  EXPECT_GT(count, rules.size());
 }
 
 TEST(Loader, AgreesOnTenThousandRandomMutations) {
