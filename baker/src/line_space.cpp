@@ -8,6 +8,7 @@
 #include <cmath>
 #include <glm/glm.hpp>
 
+#include "conservative.h"
 #include "lsp/lsp.h"
 #include "lsp/program.h"
 
@@ -87,24 +88,27 @@ class Filler {
     const glm::vec3 reach = glm::max(glm::abs(lo), glm::abs(hi));
     const float margin = std::max({extent.x, extent.y, extent.z}) * 1e-4f +
                          std::max({reach.x, reach.y, reach.z}) * 3.8146973e-6f;
-    lo_ = lo - margin;
-    hi_ = hi + margin;
+    // Geometry of a node then is inside by the margin too, and need not be looked for outside.
+    if (options.conservative) empty_margin_ = empty_margin(header);
+    lo_ = lo - std::max(margin, 2 * float(empty_margin_));
+    hi_ = hi + std::max(margin, 2 * float(empty_margin_));
   }
 
   Filled run() {
     const uint32_t n = options_.resolution;
-    const bool binary = options_.kind == LineSpaceKind::kBinary;
-    const uint32_t shafts = (binary ? 15 : 30) * n * n * n * n;
+    if (options_.conservative) return pack(touched());
+    const bool binary = options_.kind == LineSpaceKind::kBinary, symmetric = binary && !options_.directed;
+    const uint32_t shafts = (symmetric ? 15 : 30) * n * n * n * n;
     std::vector<uint32_t> hit(shafts, LSP_NONE);
     const uint32_t patches = n * n;
     const std::vector<Sample> samples = shaft_samples(binary ? 1 : options_.samples);
     const lsp_trace_options trace = {binary ? LSP_TRACE_ANY_HIT : 0u, 0.0f};
     for (uint32_t in = 0; in < 6; ++in)
-      for (uint32_t out = binary ? in + 1 : 0; out < 6; ++out) {
+      for (uint32_t out = symmetric ? in + 1 : 0; out < 6; ++out) {
         if (in == out) continue;
         for (uint32_t p = 0; p < patches; ++p) {
           const uint32_t base =
-              binary ? LSP_SHAFT_INDEX_SYMMETRIC(in, out, p, 0u, n) : LSP_SHAFT_INDEX(in, out, p, 0u, n);
+              symmetric ? LSP_SHAFT_INDEX_SYMMETRIC(in, out, p, 0u, n) : LSP_SHAFT_INDEX(in, out, p, 0u, n);
           fill_row(in, p, out, samples, trace, &hit[base]);
         }
       }
@@ -112,6 +116,42 @@ class Filler {
   }
 
  private:
+  // The shafts that a triangle touches, in either direction, and one such triangle each.
+  std::vector<uint32_t> touched() const {
+    const uint32_t n = options_.resolution, patches = n * n;
+    std::vector<uint32_t> either(15 * patches * patches, LSP_NONE);
+    TouchedShafts shafts(lo_, hi_, empty_margin_, n);
+    add_touched(site_.subtree, shafts, either);
+    if (!options_.directed) return either;
+    std::vector<uint32_t> directed(30 * patches * patches, LSP_NONE);
+    for (uint32_t in = 0; in < 6; ++in)
+      for (uint32_t out = in + 1; out < 6; ++out)
+        for (uint32_t p = 0; p < patches; ++p)
+          for (uint32_t q = 0; q < patches; ++q)
+            directed[LSP_SHAFT_INDEX(in, out, p, q, n)] = directed[LSP_SHAFT_INDEX(out, in, q, p, n)] =
+                either[LSP_SHAFT_INDEX_SYMMETRIC(in, out, p, q, n)];
+    return directed;
+  }
+
+  // A node of the BVH counts with all its triangles, a cell of an NTree with those that reach into it.
+  void add_touched(uint32_t child, TouchedShafts& shafts, std::vector<uint32_t>& either) const {
+    const bool in_cell = header_.ntree_branching != 0;
+    const glm::dvec3 grown(2.0 * header_.ntree_margin);
+    const glm::dvec3 lo = glm::dvec3(vec(site_.lo)) - grown, hi = glm::dvec3(vec(site_.hi)) + grown;
+    const auto apart = [&](const lsp_float3& l, const lsp_float3& h) {
+      return l.x > hi.x || l.y > hi.y || l.z > hi.z || h.x < lo.x || h.y < lo.y || h.z < lo.z;
+    };
+    if (!(child & LSP_LEAF_BIT)) {
+      const LspNode& node = scene_.nodes[child];
+      if (!in_cell || !apart(node.lo0, node.hi0)) add_touched(node.child0, shafts, either);
+      if (!in_cell || !apart(node.lo1, node.hi1)) add_touched(node.child1, shafts, either);
+      return;
+    }
+    const uint32_t first = child & LSP_LEAF_FIRST_MASK;
+    for (uint32_t i = first; i <= first + (child >> LSP_LEAF_COUNT_SHIFT & LSP_LEAF_COUNT_MASK); ++i)
+      if (!in_cell || reaches_into(scene_.triangles[i], lo, hi)) shafts.add(scene_.triangles[i], i, either);
+  }
+
   // The shafts from one patch to all patches of one face. The first rays of a shaft often settle it: all
   // miss, or one plane answers them all; only the other shafts are given the remaining samples.
   void fill_row(uint32_t in, uint32_t p, uint32_t out, const std::vector<Sample>& samples,
@@ -203,7 +243,8 @@ class Filler {
                      f3(scale),
                      first,
                      n | bytes << LSP_FORMAT_ENTRY_SHIFT | (dense ? LSP_FORMAT_DENSE : 0) |
-                         (binary ? LSP_FORMAT_SYMMETRIC : 0),
+                         (binary && !options_.directed ? LSP_FORMAT_SYMMETRIC : 0) |
+                         (options_.conservative ? LSP_FORMAT_CONSERVATIVE : 0),
                      filled,
                      count,
                      site_.child};
@@ -239,6 +280,7 @@ class Filler {
   const LineSpaceSite& site_;
   lsp_scene scene_{};
   glm::vec3 lo_, hi_;
+  double empty_margin_ = 0;
   std::vector<LspRay> rays_;
   std::vector<LspHit> hits_;
 };
@@ -258,7 +300,8 @@ LineSpaces fill_line_spaces(const Bvh& bvh, const LspHeader& header, std::span<c
     all.candidates.keep_in_file(options.folder);
   }
   const uint32_t n = options.resolution;
-  const uint64_t shafts = (options.kind == LineSpaceKind::kBinary ? 15ull : 30ull) * n * n * n * n;
+  const bool symmetric = options.kind == LineSpaceKind::kBinary && !options.directed;
+  const uint64_t shafts = (symmetric ? 15ull : 30ull) * n * n * n * n;
   references.assign(sites.size(), LSP_NONE);
   // A batch at a time, so that no more than one is in memory twice.
   const size_t batch_sites = size_t(std::max<uint64_t>(2, options.batch_bytes / (shafts * kBytesPerShaft)));

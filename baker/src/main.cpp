@@ -37,6 +37,8 @@ struct Arguments {
   bool no_exact = false;
   bool exact = false;
   bool no_line_spaces = false;
+  bool conservative = false;
+  bool directed = false;
   std::string compress = "none";
   uint32_t align = 4096;
   uint32_t threads = 0;
@@ -119,6 +121,8 @@ Json provenance(const Arguments& a, const Mesh& mesh, const std::array<uint64_t,
             {"for", kPurposes.at(a.purpose)},
             {"exact", !a.no_exact},
             {"line_spaces", !a.no_line_spaces},
+            {"conservative", a.conservative},
+            {"directed", a.directed},
             {"spatial_splits", !a.no_splits},
             {"normal_angle", a.normal_angle},
             {"plane_tolerance", a.plane_tolerance},
@@ -140,6 +144,8 @@ Exit run(Arguments a) {
                   "--max-error chooses --resolution, --depth and --samples itself, leave them out");
   if (a.max_error > 0 && (a.no_line_spaces || a.purpose == Purpose::kVisibility))
     throw Failure(Exit::kUsage, "", "--max-error needs Line Spaces with candidates");
+  if ((a.conservative || a.directed) && (a.purpose != Purpose::kVisibility || a.no_line_spaces))
+    throw Failure(Exit::kUsage, "", "--conservative and --directed need the Line Spaces of --for visibility");
   const Quality& preset = kPresets.at(a.preset);
   const bool ntree = a.base == "ntree";
   if (!ntree && (a.branching || a.levels != kNTreeLevels))
@@ -148,7 +154,8 @@ Exit run(Arguments a) {
     throw Failure(Exit::kUsage, "", "--max-error chooses among BVHs, leave out --base");
   if (!a.resolution_given) a.resolution = preset.resolution;
   if (ntree && !a.branching) a.branching = std::clamp(a.resolution, 2u, LSP_MAX_BRANCHING);
-  if (!a.depth_given) a.depths = {ntree ? a.levels - 1 : preset.depth};
+  // At depth 1 an NTree's error costs the fewest bytes: bunny, N = 6, 1.2 % wrong and 13 MB against 0.3 % and 142 MB.
+  if (!a.depth_given) a.depths = {ntree ? std::min(a.levels - 1, 1u) : preset.depth};
   if (!a.samples_given) a.samples = preset.samples;
   if (a.no_line_spaces && a.no_exact)
     throw Failure(Exit::kUsage, "", "--no-line-spaces with --no-exact leaves nothing to trace");
@@ -182,6 +189,8 @@ Exit run(Arguments a) {
   options.line_space.triangles = a.triangles;
   options.line_space.kind =
       a.purpose == Purpose::kVisibility ? LineSpaceKind::kBinary : LineSpaceKind::kCandidates;
+  options.line_space.conservative = a.conservative;
+  options.line_space.directed = a.directed;
   options.normal_angle_degrees = a.normal_angle;
   options.plane_tolerance = a.plane_tolerance;
   options.memory_limit = a.memory_limit;
@@ -331,6 +340,12 @@ int main(int argc, char** argv) {
                                                                          {"glossy", Purpose::kGlossy},
                                                                          {"all", Purpose::kAll}}))
       ->default_str("all");
+  app.add_flag("--conservative", a.conservative,
+               "With --for visibility: a shaft counts as empty only where no triangle touches it, so that exact "
+               "rays may skip it (lsp-trace --skip-empty)");
+  app.add_flag("--directed", a.directed,
+               "With --for visibility: a bit for either direction of a shaft, 30 N^4 and not 15 N^4; both are "
+               "alike, what is inside does not depend on the direction");
   app.add_flag("--exact", a.exact, "Keep the exact tree below the Line Spaces (the default)");
   app.add_flag("--no-exact", a.no_exact, "Keep only what approximate rays need");
   app.add_flag("--no-line-spaces", a.no_line_spaces, "Bake the exact tree alone");
