@@ -272,6 +272,34 @@ TEST_F(Vulkan, SectionOverTheDevicesLimitIsNamed) {
   EXPECT_EQ(plan.usage & VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT, 0u);
 }
 
+// Candidates that lie beyond what a storage buffer of most devices may hold (128 MiB on lavapipe).
+TEST_F(Vulkan, SectionBeyondTheStorageBufferRange) {
+  constexpr uint32_t kBefore = 50'000'000;  // words
+  Parts parts = build_parts({});
+  const std::vector<LspRay> rays = hard_rays(parts, 2000, 5);
+  std::vector<uint32_t> shifted(kBefore);
+  shifted.insert(shifted.end(), parts.candidates.begin(), parts.candidates.end());
+  parts.candidates = std::move(shifted);
+  parts.header.candidate_word_count += kBefore;
+  for (LspLineSpace& l : parts.line_spaces) l.candidate_first += kBefore;
+  const Bytes bytes = write_raw(parts);
+  const lsp_scene scene = open_scene(bytes.data(), bytes.size());
+  const lsp_trace_options options{LSP_TRACE_APPROXIMATE | LSP_TRACE_NEAR_APPROXIMATE, 0};
+  std::vector<LspHit> cpu(rays.size()), gpu(rays.size());
+  ASSERT_EQ(lsp_trace(&scene, &options, rays.data(), cpu.data(), rays.size(), nullptr, nullptr), LSP_OK);
+  for (const LoadPath path : {LoadPath::kImport, LoadPath::kUpload}) {
+    VulkanTracer tracer;
+    try {
+      tracer.load(scene, LSP_USE_APPROXIMATE, path);
+    } catch (const Failure& failure) {
+      EXPECT_EQ(failure.exit(), Exit::kUnsupported) << failure.what();
+      continue;
+    }
+    tracer.trace(options, rays, gpu);
+    EXPECT_EQ(memcmp(cpu.data(), gpu.data(), cpu.size() * sizeof(LspHit)), 0);
+  }
+}
+
 // The copies that the plan asks for are each buffer's bytes, once, whatever their size.
 TEST(VulkanPlan, PiecesCoverEveryBufferOnce) {
   const Bytes bytes = write_raw(build_parts({}));

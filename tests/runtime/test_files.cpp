@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -50,6 +51,42 @@ TEST_F(Files, WhatCannotBeMapped) {
   EXPECT_EQ(lsp_map_file(write("empty", {}).c_str(), &mapping, &error), LSP_ERROR_INVALID);
   EXPECT_EQ(mapping.bytes, nullptr);
   lsp_unmap_file(&mapping);  // nothing to do, and no harm
+}
+
+// Sections beyond 4 GiB, in a file that is mostly a hole.
+TEST_F(Files, BeyondFourGibibytes) {
+  constexpr uint64_t kHole = uint64_t{5} << 30;
+  Bytes raw = write_raw(build_parts({}));
+  const std::string small = write("small.lsp", raw), large = (folder_ / "large.lsp").string();
+  const uint64_t size = raw.size();
+  auto& header = *reinterpret_cast<LspHeader*>(raw.data());
+  auto* table = reinterpret_cast<LspSection*>(raw.data() + header.section_table_offset);
+  const uint64_t first = table[0].offset;
+  header.file_bytes += kHole;
+  for (uint32_t i = 0; i < header.section_count; ++i) table[i].offset += kHole;
+  {
+    std::ofstream out(large, std::ios::binary);
+    out.write(reinterpret_cast<const char*>(raw.data()), static_cast<std::streamsize>(first));
+    out.seekp(static_cast<std::streamoff>(first + kHole));
+    out.write(reinterpret_cast<const char*>(raw.data() + first), static_cast<std::streamsize>(size - first));
+    if (!out) GTEST_SKIP() << "no file of 5 GiB here";
+  }
+  const SceneFile near_file(small), far_file(large);
+  const LspHeader& h = near_file.scene().header[0];
+  std::vector<LspRay> rays;
+  for (int i = 0; i < 200; ++i) {
+    const float a = 0.1f * static_cast<float>(i);
+    rays.push_back({h.bounds_min, 0, {std::cos(a) + 1.1f, std::sin(a) + 1.1f, 1}, INFINITY});
+  }
+  for (const uint32_t flags : {0u, LSP_TRACE_APPROXIMATE}) {
+    const lsp_trace_options options{flags, 0};
+    std::vector<LspHit> a(rays.size()), b(rays.size());
+    ASSERT_EQ(lsp_trace(&near_file.scene(), &options, rays.data(), a.data(), rays.size(), nullptr, nullptr),
+              LSP_OK);
+    ASSERT_EQ(lsp_trace(&far_file.scene(), &options, rays.data(), b.data(), rays.size(), nullptr, nullptr),
+              LSP_OK);
+    EXPECT_EQ(memcmp(a.data(), b.data(), a.size() * sizeof(LspHit)), 0);
+  }
 }
 
 TEST_F(Files, RawIsMappedPackedIsUnpacked) {
