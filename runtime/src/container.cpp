@@ -116,13 +116,13 @@ lsp_status check_limits(const LspHeader& header, lsp_error* error) {
   const uint64_t steps = is_ntree(header) ? ntree_steps(header) : 2 * uint64_t{header.node_count};
   if (header.max_steps > steps + kStepsSlack) {
     return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, max_steps),
-                "states %u steps of traversal, more than its %u nodes have children", header.max_steps,
+                "states %u steps of traversal, more than its %u nodes allow", header.max_steps,
                 header.node_count);
   }
-  if (!is_ntree(header) && header.max_leaf_triangles > LSP_MAX_LEAF_TRIANGLES) {
+  const uint32_t max_leaf = is_ntree(header) ? header.reference_count : LSP_MAX_LEAF_TRIANGLES;
+  if (header.max_leaf_triangles > max_leaf) {
     return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, max_leaf_triangles),
-                "states leaves of %u triangles, the limit is %u", header.max_leaf_triangles,
-                LSP_MAX_LEAF_TRIANGLES);
+                "states leaves of %u triangles, the limit is %u", header.max_leaf_triangles, max_leaf);
   }
   if (header.node_count > kMaxReferences || header.line_space_count > kMaxReferences ||
       header.triangle_count > LSP_LEAF_FIRST_MASK + 1u) {
