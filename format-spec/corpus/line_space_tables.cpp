@@ -84,22 +84,24 @@ void LineSpaceTables::fill(Image& image, uint32_t index, uint32_t child, const B
   space.triangle_first = triangle_first;
   space.triangle_count = triangle_count;
   space.child = child;
-  const bool binary = options_.entry_bytes == 0;
+  const bool symmetric = options_.entry_bytes == 0 && !options_.directed;
   space.format = n | options_.entry_bytes << LSP_FORMAT_ENTRY_SHIFT |
-                 (options_.dense ? LSP_FORMAT_DENSE : 0) | (binary ? LSP_FORMAT_SYMMETRIC : 0);
+                 (options_.dense ? LSP_FORMAT_DENSE : 0) | (symmetric ? LSP_FORMAT_SYMMETRIC : 0) |
+                 (options_.conservative ? LSP_FORMAT_CONSERVATIVE : 0);
 
   std::vector<uint32_t> shafts(format::shape_of(space.format).shafts, LSP_NONE);
   for (uint32_t in = 0; in < 6; ++in)
-    for (uint32_t out = binary ? in + 1 : 0; out < 6; ++out) {
+    for (uint32_t out = symmetric ? in + 1 : 0; out < 6; ++out) {
       if (in == out) continue;
       for (uint32_t p = 0; p < n * n; ++p)
         for (uint32_t q = 0; q < n * n; ++q) {
           const uint32_t shaft =
-              binary ? LSP_SHAFT_INDEX_SYMMETRIC(in, out, p, q, n) : LSP_SHAFT_INDEX(in, out, p, q, n);
+              symmetric ? LSP_SHAFT_INDEX_SYMMETRIC(in, out, p, q, n) : LSP_SHAFT_INDEX(in, out, p, q, n);
           shafts[shaft] =
               nearest(image, space, patch_centroid(space, n, in, p), patch_centroid(space, n, out, q));
         }
     }
+  if (options_.conservative) std::fill(shafts.begin(), shafts.end(), 0u);
   for (uint32_t entry : shafts) space.filled += entry != LSP_NONE;
   if (tables_.size() <= index) tables_.resize(index + 1);
   tables_[index] = std::move(shafts);

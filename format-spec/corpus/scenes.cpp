@@ -18,7 +18,8 @@ class Builder {
   Builder(std::vector<LspTriangle> triangles, const SceneOptions& options)
       : options_(options),
         input_(std::move(triangles)),
-        tables_({options.resolution, options.entry_bytes, options.dense}) {}
+        tables_({options.resolution, options.entry_bytes, options.dense, options.directed,
+                 options.conservative}) {}
 
   Image run() {
     Box bounds = Box::nothing();
@@ -220,6 +221,10 @@ std::vector<ValidFile> valid_files() {
       encode(box_on_floor({.resolution = 1, .dense = true})));
   add("binary", "binary, symmetric Line Spaces: bits and no candidates",
       encode(box_on_floor({.resolution = 2, .entry_bytes = 0})));
+  add("binary-directed", "binary Line Spaces with a bit for each direction of a shaft",
+      encode(box_on_floor({.resolution = 2, .entry_bytes = 0, .directed = true})));
+  add("binary-conservative", "binary Line Spaces whose clear bits would be proofs",
+      encode(box_on_floor({.resolution = 1, .entry_bytes = 0, .conservative = true})));
   add("root-line-space", "the root carries a Line Space",
       encode(box_on_floor({.resolution = 1, .depths = {0}})));
   add("approximate", "no exact tree: subtrees below terminal Line Spaces are left out",
