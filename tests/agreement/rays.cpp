@@ -11,7 +11,8 @@ constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 class Rays {
  public:
-  Rays(const Parts& parts, uint64_t seed, float scale) : parts_(parts), random_(seed), scale_(scale) {}
+  Rays(std::span<const LspTriangle> triangles, uint64_t seed, float scale)
+      : triangles_(triangles), random_(seed), scale_(scale) {}
 
   LspRay make(uint32_t kind) {
     LspRay ray{point(2), 0, direction(), kInfinity};
@@ -121,8 +122,8 @@ class Rays {
   }
   const LspTriangle& triangle() {
     static constexpr LspTriangle kNone{};
-    if (parts_.triangles.empty()) return kNone;
-    return parts_.triangles[random_.below(static_cast<uint32_t>(parts_.triangles.size()))];
+    if (triangles_.empty()) return kNone;
+    return triangles_[random_.below(static_cast<uint32_t>(triangles_.size()))];
   }
   lsp_float3 corner() {
     const LspTriangle& t = triangle();
@@ -134,15 +135,16 @@ class Rays {
     ray.direction = {at.x - ray.origin.x, at.y - ray.origin.y, at.z - ray.origin.z};
   }
 
-  const Parts& parts_;
+  std::span<const LspTriangle> triangles_;
   Random random_;
   float scale_;
 };
 
 }  // namespace
 
-std::vector<LspRay> hard_rays(const Parts& parts, uint32_t count, uint64_t seed, float scale) {
-  Rays rays(parts, seed, scale);
+std::vector<LspRay> hard_rays(std::span<const LspTriangle> triangles, uint32_t count, uint64_t seed,
+                              float scale) {
+  Rays rays(triangles, seed, scale);
   std::vector<LspRay> result;
   result.reserve(count);
   for (uint32_t i = 0; i < count; ++i) result.push_back(rays.make(i % Rays::kKinds));

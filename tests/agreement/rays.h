@@ -2,6 +2,7 @@
 // inside, with signed zeros, with lengths at the ends of the range, and invalid ones.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "scene_builder.h"
@@ -9,6 +10,6 @@
 namespace lsp::test {
 
 // `count` rays about a scene of the given scale, every kind in turn.
-std::vector<LspRay> hard_rays(const Parts& parts, uint32_t count, uint64_t seed, float scale = 1);
+std::vector<LspRay> hard_rays(std::span<const LspTriangle> triangles, uint32_t count, uint64_t seed, float scale = 1);
 
 }  // namespace lsp::test

@@ -139,7 +139,7 @@ TEST_P(Agreement, HardRays) {
     const Parts parts = build_parts(options);
     if (parts.line_spaces.empty() && (std::get<1>(GetParam()).options.flags & LSP_TRACE_APPROXIMATE) != 0)
       continue;
-    const uint64_t hits = compare(parts, hard_rays(parts, 26000, 1 + triangles));
+    const uint64_t hits = compare(parts, hard_rays(parts.triangles, 26000, 1 + triangles));
     if (!skipped_.empty()) GTEST_SKIP() << skipped_;
     if (triangles > 100) {
       EXPECT_GT(hits, 5000u);
@@ -155,7 +155,7 @@ TEST_P(Agreement, ScenesOfEveryScale) {
     BuildOptions options;
     options.scale = scale;
     const Parts parts = build_parts(options);
-    compare(parts, hard_rays(parts, 4000, 77, scale));
+    compare(parts, hard_rays(parts.triangles, 4000, 77, scale));
     if (!skipped_.empty()) GTEST_SKIP() << skipped_;
   }
 }

@@ -12,6 +12,7 @@
 #include "lsp/lsp.h"
 #include "lsp/scene_file.hpp"
 #include "lsp/vulkan_device.hpp"
+#include "rays.h"
 #include "scene_builder.h"
 #include "writer.h"
 
@@ -113,7 +114,10 @@ class Baked : public testing::TestWithParam<const char*> {
     if (!exact) keep_approximate_only(baked);
     write_lsp(path_, baked, "{}", {});
     const SceneFile file(path_);
-    const std::vector<LspRay> rays = surface_rays(file.scene(), 20000);
+    std::vector<LspRay> rays = surface_rays(file.scene(), 20000);
+    const std::vector<LspRay> hard =
+        hard_rays({file.scene().triangles, file.scene().header->triangle_count}, 2600, 3);
+    rays.insert(rays.end(), hard.begin(), hard.end());
     std::vector<LspHit> cpu(rays.size());
     std::vector<LspHit> gpu(rays.size());
     VulkanTracer tracer;

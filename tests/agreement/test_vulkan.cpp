@@ -171,7 +171,7 @@ TEST_F(Vulkan, ManyBatchesAndPieces) {
   ASSERT_GT(bytes.size(), 6u << 20);
   const lsp_scene scene = open_scene(bytes.data(), bytes.size());
   std::vector<LspRay> rays((1u << 20) + 5000);
-  const std::vector<LspRay> few = hard_rays(parts, 5000, 9);
+  const std::vector<LspRay> few = hard_rays(parts.triangles, 5000, 9);
   for (size_t i = 0; i < rays.size(); ++i) {
     rays[i] = few[i % few.size()];
     if (i >= few.size() && i < 1u << 20) rays[i].tmin = 1, rays[i].tmax = 0;  // invalid: quick
@@ -276,7 +276,7 @@ TEST_F(Vulkan, SectionOverTheDevicesLimitIsNamed) {
 TEST_F(Vulkan, SectionBeyondTheStorageBufferRange) {
   constexpr uint32_t kBefore = 50'000'000;  // words
   Parts parts = build_parts({});
-  const std::vector<LspRay> rays = hard_rays(parts, 2000, 5);
+  const std::vector<LspRay> rays = hard_rays(parts.triangles, 2000, 5);
   std::vector<uint32_t> shifted(kBefore);
   shifted.insert(shifted.end(), parts.candidates.begin(), parts.candidates.end());
   parts.candidates = std::move(shifted);
@@ -331,7 +331,7 @@ TEST_F(Vulkan, ValidationHasNothingToSay) {
   const Parts parts = build_parts({});
   const Bytes bytes = write_raw(parts);
   const lsp_scene scene = open_scene(bytes.data(), bytes.size());
-  const std::vector<LspRay> rays = hard_rays(parts, 1000, 5);
+  const std::vector<LspRay> rays = hard_rays(parts.triangles, 1000, 5);
   std::vector<LspHit> hits(rays.size());
   for (const int kind : {0, 1, 2, 3}) {
     VulkanOptions options;
@@ -359,7 +359,7 @@ TEST_F(Vulkan, ValidationHasNothingToSay) {
 TEST_F(Vulkan, WildIndicesStayInsideTheBuffers) {
   Parts parts = build_parts({});
   Random random(11);
-  const std::vector<LspRay> rays = hard_rays(parts, 2000, 3);
+  const std::vector<LspRay> rays = hard_rays(parts.triangles, 2000, 3);
   for (LspNode& node : parts.nodes) {
     if (random.below(4) == 0) node.child0 = random.next();
     if (random.below(4) == 0) node.line_space1 = random.next();
