@@ -25,6 +25,7 @@ struct Options {
   std::string near = "exact";
   std::string load_path = "automatic";
   std::string device;
+  bool skip_empty = false;
   float lod = 0;
   uint32_t repeats = 1;
   uint32_t threads = std::max(1u, std::thread::hardware_concurrency());
@@ -52,6 +53,8 @@ void define(CLI::App& app, Options& options) {
       ->check(CLI::Range(0.0f, 1e6f));
   app.add_option("--near", options.near, "How to answer where a Line Space's node holds the ray's origin")
       ->check(CLI::IsMember({"exact", "skip", "approximate"}));
+  app.add_flag("--skip-empty", options.skip_empty,
+               "Exact: leave out nodes whose shaft a conservative Line Space proves empty; the same answers");
   app.add_option("--repeat", options.repeats, "Times to trace all rays")->check(CLI::Range(1u, 1000000u));
   app.add_option("--threads", options.threads, "Threads of the CPU backend; all without it")
       ->check(CLI::Range(1u, 65536u));
@@ -77,7 +80,7 @@ TraceRequest make_request(const Options& options, const LspHeader& header) {
   if (options.query == "any") request.options.flags |= LSP_TRACE_ANY_HIT;
   if (options.near == "approximate") request.options.flags |= LSP_TRACE_NEAR_APPROXIMATE;
   if (options.near == "skip") request.options.flags |= LSP_TRACE_NEAR_SKIP;
-  if (options.near == "skip") request.options.flags |= LSP_TRACE_NEAR_SKIP;
+  if (options.skip_empty) request.options.flags |= LSP_TRACE_SKIP_EMPTY;
   request.options.lod = options.lod;
   request.vulkan = options.backend == "vulkan";
   request.repeats = options.repeats;
@@ -100,6 +103,7 @@ nlohmann::ordered_json to_json(const Options& options, const TraceRequest& reque
   json["mode"] = (request.options.flags & LSP_TRACE_APPROXIMATE) != 0 ? "approximate" : "exact";
   json["query"] = options.query;
   json["near"] = options.near;
+  json["skip_empty"] = options.skip_empty;
   json["lod"] = options.lod;
   json["threads"] = request.vulkan ? 0u : options.threads;
   json["rays"] = counts.rays;

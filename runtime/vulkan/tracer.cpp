@@ -394,10 +394,14 @@ VulkanTrace VulkanTracer::Impl::trace(const lsp_trace_options& wanted, std::span
                                       std::span<LspHit> hits, bool count) {
   // Flags that have no meaning together make no pipeline of their own.
   lsp_trace_options options = wanted;
-  options.flags &= (wanted.flags & LSP_TRACE_APPROXIMATE) != 0 ? LSP_TRACE_ALL_FLAGS : LSP_TRACE_ANY_HIT;
+  options.flags &= (wanted.flags & LSP_TRACE_APPROXIMATE) != 0 ? LSP_TRACE_ALL_FLAGS & ~LSP_TRACE_SKIP_EMPTY
+                                                               : LSP_TRACE_ANY_HIT | LSP_TRACE_SKIP_EMPTY;
   if ((options.flags & LSP_TRACE_NEAR_APPROXIMATE) != 0) options.flags &= ~LSP_TRACE_NEAR_SKIP;
-  const uint32_t needed = (options.flags & LSP_TRACE_APPROXIMATE) != 0 ? LSP_USE_APPROXIMATE : LSP_USE_EXACT;
-  if (scene_buffers == nullptr || (uses_ & needed) == 0) {
+  if (scene_.header == nullptr || (scene_.header->required_features & LSP_FEATURE_BINARY) == 0)
+    options.flags &= ~LSP_TRACE_SKIP_EMPTY;
+  uint32_t needed = (options.flags & LSP_TRACE_APPROXIMATE) != 0 ? LSP_USE_APPROXIMATE : LSP_USE_EXACT;
+  if ((options.flags & LSP_TRACE_SKIP_EMPTY) != 0) needed |= LSP_USE_APPROXIMATE;
+  if (scene_buffers == nullptr || (uses_ & needed) != needed) {
     throw Failure(Exit::kUnsupported, "", "the scene is not loaded for this kind of trace");
   }
   if (hits.size() != rays.size()) throw Failure(Exit::kInternal, "", "as many hits as rays are needed");

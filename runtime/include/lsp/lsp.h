@@ -107,7 +107,13 @@ lsp_status lsp_unpack(const void* bytes, uint64_t size, void* out, uint64_t out_
  * on the ray's line, and trace exactly only when that lies ahead. Saves most of the exact work near the origin
  * for a small error; ignored with LSP_TRACE_NEAR_APPROXIMATE. */
 #define LSP_TRACE_NEAR_SKIP 0x8u
-#define LSP_TRACE_ALL_FLAGS 0xFu
+
+/* Exact traces: ask conservative Line Spaces (lsp-bake --conservative) first, and leave out a node whose shaft is
+ * proven empty. The answers are the same to the bit, any hit's too; fewer nodes are visited, for a look-up at every
+ * Line Space passed. Does nothing in approximate traces, in files without such Line Spaces, and for rays that begin
+ * further than about two extents from the scene, whose rounding the Line Spaces do not cover. */
+#define LSP_TRACE_SKIP_EMPTY 0x10u
+#define LSP_TRACE_ALL_FLAGS 0x1Fu
 
 typedef struct lsp_trace_options {
   uint32_t flags; /* LSP_TRACE_* */

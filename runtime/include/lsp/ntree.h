@@ -119,7 +119,7 @@ LSP_FN LspBest lsp_traverse(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod
       if (((word.bits >> bit) & 1u) != 0u) {
         LspCell record = LSP_CELL(word.offset + uint(bitCount(word.bits & ((1u << bit) - 1u))));
         ref = record.child;
-        if (far || (record.line_space != LSP_NONE && (flags & LSP_TRACE_APPROXIMATE_BIT) != 0u)) {
+        if (far || (record.line_space != LSP_NONE && (flags & (LSP_TRACE_APPROXIMATE_BIT | LSP_TRACE_SKIP_EMPTY_BIT)) != 0u)) {
           vec3 lo = lsp_ntree_lo(LSP_SCENE_ARG_ cell, size);
           vec3 hi = lsp_ntree_lo(LSP_SCENE_ARG_ cell + ivec3(1), size);
           if (far) {
