@@ -2,6 +2,8 @@
 
 #include <unistd.h>
 
+#include <algorithm>
+
 #include "random.h"
 #include "writer.h"
 
@@ -10,14 +12,25 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// As the importers make it: triangles without area keep their number and are left out.
 Mesh mesh_of(const Triangles& triangles) {
   Mesh mesh;
   for (const auto& t : triangles) {
+    const auto primitive = static_cast<uint32_t>(mesh.primitive_count++);
+    const glm::dvec3 normal = bench::geometric_normal(t);
+    double longest = 0;
+    for (size_t k = 0; k < 3; ++k) {
+      longest = std::max(longest, glm::distance(glm::dvec3(t[k]), glm::dvec3(t[(k + 1) % 3])));
+    }
+    if (!(0.5 * glm::length(normal) > 1e-14 * longest * longest)) {
+      ++mesh.rejected.degenerate;
+      continue;
+    }
     const auto first = static_cast<uint32_t>(mesh.positions.size());
-    for (const glm::vec3& p : t) mesh.positions.push_back(p);
+    mesh.positions.insert(mesh.positions.end(), t.begin(), t.end());
     mesh.triangles.emplace_back(first, first + 1, first + 2);
-    mesh.primitives.push_back(static_cast<uint32_t>(mesh.primitive_count++));
-    const glm::vec3 n(glm::normalize(bench::geometric_normal(t)));
+    mesh.primitives.push_back(primitive);
+    const glm::vec3 n(glm::normalize(normal));
     mesh.normals.push_back({n, n, n});
     mesh.material_ids.push_back(0);
   }
@@ -27,17 +40,21 @@ Mesh mesh_of(const Triangles& triangles) {
 
 }  // namespace
 
-StressScene::StressScene(std::string name, const Triangles& triangles, const SceneOptions& options)
-    : name_(std::move(name)) {
+void bake_to(const fs::path& path, const Triangles& triangles, const SceneOptions& options) {
   BakeOptions bake_options;
   bake_options.base = options.base;
   bake_options.line_space.resolution = options.resolution;
   bake_options.line_space.depths = options.base == Base::kNTree ? std::vector<uint32_t>{1} : options.depths;
   Baked baked = bake(mesh_of(triangles), bake_options);
+  write_lsp(path, baked, "{}", {});
+}
+
+StressScene::StressScene(std::string name, const Triangles& triangles, const SceneOptions& options)
+    : name_(std::move(name)) {
   static int number = 0;
   const fs::path path = fs::temp_directory_path() /
                         ("lsp_stress_" + std::to_string(getpid()) + "_" + std::to_string(number++) + ".lsp");
-  write_lsp(path, baked, "{}", {});
+  bake_to(path, triangles, options);
   file_ = std::make_unique<SceneFile>(path.string());
   fs::remove(path);  // the mapping keeps it
   soup_ = bench::soup_of(file_->scene());

@@ -20,9 +20,11 @@ struct SceneOptions {
   std::vector<uint32_t> depths = {1, 3};  // of the Line Spaces; of an NTree 1
 };
 
+// Bakes `triangles`, in import order, into the file. Throws Failure.
+void bake_to(const std::filesystem::path& path, const Triangles& triangles, const SceneOptions& options = {});
+
 class StressScene {
  public:
-  // Bakes `triangles` in import order. Throws Failure.
   StressScene(std::string name, const Triangles& triangles, const SceneOptions& options = {});
 
   const std::string& name() const { return name_; }
