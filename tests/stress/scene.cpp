@@ -95,4 +95,18 @@ Triangles placed(Triangles triangles, float scale, glm::vec3 offset) {
   return triangles;
 }
 
+std::vector<StressScene> family_scenes() {
+  std::vector<StressScene> made;
+  const SceneOptions ntree{Base::kNTree, 4, {}};
+  made.emplace_back("room", room());
+  made.emplace_back("room_ntree", room(), ntree);
+  made.emplace_back("room_small", placed(room(), 1e-6f, glm::vec3(0)));
+  made.emplace_back("room_small_ntree", placed(room(), 1e-6f, glm::vec3(0)), ntree);
+  made.emplace_back("room_large", placed(room(), 1e6f, glm::vec3(0)));
+  made.emplace_back("room_away", placed(room(), 3, glm::vec3(1000, -2000, 500)));
+  made.emplace_back("room_away_ntree", placed(room(), 3, glm::vec3(1000, -2000, 500)), ntree);
+  made.emplace_back("room_moved", placed(room(), 1, glm::vec3(-0.5f)));
+  return made;
+}
+
 }  // namespace lsp::stress

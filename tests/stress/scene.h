@@ -42,6 +42,9 @@ class StressScene {
 // thickness, a table in the air, tilted triangles through one another, a needle, two coincident triangles.
 Triangles room();
 
+// Rooms of every scale, near and away from the origin, on both base structures.
+std::vector<StressScene> family_scenes();
+
 // Scales, then moves.
 Triangles placed(Triangles triangles, float scale, glm::vec3 offset);
 

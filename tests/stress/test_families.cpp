@@ -18,19 +18,7 @@ uint64_t rays_per_family() {
 }
 
 const std::vector<StressScene>& scenes() {
-  static const std::vector<StressScene> all = [] {
-    std::vector<StressScene> made;
-    const SceneOptions ntree{Base::kNTree, 4, {}};
-    made.emplace_back("room", room());
-    made.emplace_back("room_ntree", room(), ntree);
-    made.emplace_back("room_small", placed(room(), 1e-6f, glm::vec3(0)));
-    made.emplace_back("room_small_ntree", placed(room(), 1e-6f, glm::vec3(0)), ntree);
-    made.emplace_back("room_large", placed(room(), 1e6f, glm::vec3(0)));
-    made.emplace_back("room_away", placed(room(), 3, glm::vec3(1000, -2000, 500)));
-    made.emplace_back("room_away_ntree", placed(room(), 3, glm::vec3(1000, -2000, 500)), ntree);
-    made.emplace_back("room_moved", placed(room(), 1, glm::vec3(-0.5f)));
-    return made;
-  }();
+  static const std::vector<StressScene> all = family_scenes();
   return all;
 }
 
