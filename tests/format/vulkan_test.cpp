@@ -21,7 +21,7 @@ void expect_same_answers(VulkanTracer& tracer, const lsp_scene& scene, const std
   const bool exact = scene.header->required_features & LSP_FEATURE_EXACT;
   const bool approximate = scene.header->required_features & LSP_FEATURE_LINE_SPACES;
   tracer.load(scene, (exact ? LSP_USE_EXACT : 0u) | (approximate ? LSP_USE_APPROXIMATE : 0u));
-  for (uint32_t flags = 0; flags < 8; ++flags) {
+  for (uint32_t flags = 0; flags <= LSP_TRACE_ALL_FLAGS; ++flags) {
     if (!(flags & LSP_TRACE_APPROXIMATE ? approximate : exact)) continue;
     const lsp_trace_options options{flags, flags & LSP_TRACE_NEAR_APPROXIMATE ? 0.5f : 0.0f};
     std::array<LspHit, 16> on_cpu, on_device;
