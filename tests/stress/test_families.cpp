@@ -10,6 +10,8 @@
 #include "checks.h"
 
 namespace lsp::stress {
+void PrintTo(const Family& family, std::ostream* out) { *out << family.what; }
+
 namespace {
 
 uint64_t rays_per_family() {

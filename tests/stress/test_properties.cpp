@@ -67,6 +67,7 @@ struct Symmetry {
   glm::vec3 (*point)(const glm::vec3&);
   glm::vec3 (*direction)(const glm::vec3&);
 };
+void PrintTo(const Symmetry& symmetry, std::ostream* out) { *out << symmetry.name; }
 glm::vec3 same(const glm::vec3& v) { return v; }
 glm::vec3 cycled(const glm::vec3& v) { return {v.y, v.z, v.x}; }
 glm::vec3 swapped(const glm::vec3& v) { return {v.y, v.x, v.z}; }

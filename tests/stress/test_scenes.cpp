@@ -22,6 +22,10 @@
 #include "rays.h"
 #include "verdict.h"
 
+namespace lsp {
+void PrintTo(Base base, std::ostream* out) { *out << (base == Base::kBvh ? "BVH" : "NTree"); }
+}  // namespace lsp
+
 namespace lsp::stress {
 namespace {
 
@@ -94,6 +98,8 @@ struct Case {
   const char* name;
   std::function<Triangles(Base)> make;
 };
+
+void PrintTo(const Case& made, std::ostream* out) { *out << made.name; }
 
 const std::vector<Case>& cases() {
   static const std::vector<Case> all = {
