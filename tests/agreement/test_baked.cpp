@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
+#include <map>
 
 #include "bake.h"
 #include "import/import.h"
@@ -103,11 +104,15 @@ class Baked : public testing::TestWithParam<const char*> {
     if (!path_.empty()) fs::remove(path_);
   }
 
-  void bake_and_compare(const Mesh& mesh, Base base, Purpose purpose, bool exact, uint32_t depth) {
+  void bake_and_compare(const Mesh& mesh, Base base, Purpose purpose, bool exact, uint32_t depth,
+                        bool conservative = false) {
     BakeOptions options;
     options.base = base;
     options.ntree.branching = 5;
     options.purpose = purpose;
+    if (purpose == Purpose::kVisibility) options.line_space.kind = LineSpaceKind::kBinary;
+    options.line_space.conservative = conservative;
+    options.line_space.directed = conservative && base == Base::kNTree;  // both kinds of table, once each
     options.line_space.resolution = 4;
     options.line_space.depths = {depth / 2, depth};
     lsp::Baked baked = bake(mesh, options);
@@ -120,12 +125,14 @@ class Baked : public testing::TestWithParam<const char*> {
     rays.insert(rays.end(), hard.begin(), hard.end());
     std::vector<LspHit> cpu(rays.size());
     std::vector<LspHit> gpu(rays.size());
+    std::map<uint32_t, std::vector<LspHit>> exact_hits;
     VulkanTracer tracer;
     tracer.load(file.scene(), LSP_USE_APPROXIMATE | (exact ? LSP_USE_EXACT : 0));
     constexpr uint32_t kApproximate = LSP_TRACE_APPROXIMATE;
     for (const uint32_t flags :
          {0u, LSP_TRACE_ANY_HIT, kApproximate, kApproximate | LSP_TRACE_ANY_HIT,
-          kApproximate | LSP_TRACE_NEAR_APPROXIMATE, kApproximate | LSP_TRACE_NEAR_SKIP}) {
+          kApproximate | LSP_TRACE_NEAR_APPROXIMATE, kApproximate | LSP_TRACE_NEAR_SKIP, LSP_TRACE_SKIP_EMPTY,
+          LSP_TRACE_SKIP_EMPTY | LSP_TRACE_ANY_HIT}) {
       if (!exact && (flags & kApproximate) == 0) continue;
       for (const float lod : {0.0f, 0.5f}) {
         SCOPED_TRACE("flags " + std::to_string(flags) + " lod " + std::to_string(lod));
@@ -139,6 +146,13 @@ class Baked : public testing::TestWithParam<const char*> {
         for (size_t i = 0; i < rays.size(); ++i)
           different += memcmp(&cpu[i], &gpu[i], sizeof(LspHit)) == 0 ? 0 : 1;
         EXPECT_EQ(different, 0u);
+        // Skipping what is empty changes no answer.
+        if ((flags & LSP_TRACE_SKIP_EMPTY) != 0)
+          EXPECT_EQ(memcmp(cpu.data(), exact_hits.at(flags & LSP_TRACE_ANY_HIT).data(),
+                           cpu.size() * sizeof(LspHit)),
+                    0);
+        else if ((flags & kApproximate) == 0)
+          exact_hits[flags] = cpu;
       }
     }
   }
@@ -155,11 +169,13 @@ TEST_P(Baked, Room) {
   if (purpose == "all") bake_and_compare(mesh, base, Purpose::kAll, true, depth);
   if (purpose == "ao") bake_and_compare(mesh, base, Purpose::kAo, true, depth);
   if (purpose == "visibility") bake_and_compare(mesh, base, Purpose::kVisibility, true, depth);
+  if (purpose == "conservative") bake_and_compare(mesh, base, Purpose::kVisibility, true, depth, true);
   if (purpose == "approximate_only") bake_and_compare(mesh, base, Purpose::kAll, false, depth);
 }
 INSTANTIATE_TEST_SUITE_P(For, Baked,
-                         testing::Values("all", "ao", "visibility", "approximate_only", "ntree_all",
-                                         "ntree_visibility", "ntree_approximate_only"),
+                         testing::Values("all", "ao", "visibility", "conservative", "approximate_only",
+                                         "ntree_all", "ntree_visibility", "ntree_conservative",
+                                         "ntree_approximate_only"),
                          [](const auto& info) { return std::string(info.param); });
 
 using BakedScene = Baked;

@@ -96,6 +96,21 @@ TEST_F(LspBake, KeepsWhatTheErrorAllows) {
   EXPECT_LE(nlohmann::json::parse(read("out"))["error"]["wrong_percent"], 20.0);
 }
 
+TEST_F(LspBake, WritesBinaryLineSpacesOfEveryKind) {
+  const std::string validate = std::string(LSP_BIN_DIR) + "/lsp-validate";
+  for (const char* base : {"bvh --depth 4", "ntree --levels 2"})
+    for (const char* kind : {"", "--conservative", "--directed", "--conservative --directed"}) {
+      SCOPED_TRACE(std::string(base) + " " + kind);
+      ASSERT_EQ(
+          run(std::string("grid.obj -o a.lsp --for visibility --resolution 4 --base ") + base + " " + kind),
+          0);
+      EXPECT_EQ(std::system(("'" + validate + "' '" + (folder_ / "a.lsp").string() + "'").c_str()), 0);
+    }
+  EXPECT_EQ(run("grid.obj -o a.lsp --conservative"), 1);
+  EXPECT_EQ(run("grid.obj -o a.lsp --for ao --directed"), 1);
+  EXPECT_EQ(run("grid.obj -o a.lsp --for visibility --conservative --no-line-spaces"), 1);
+}
+
 TEST_F(LspBake, LeavesTheOldFileWholeWhenKilled) {
   ASSERT_EQ(run("grid.obj -o a.lsp --depth 4"), 0);
   const std::string before = read("a.lsp");
