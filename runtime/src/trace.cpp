@@ -26,7 +26,8 @@ extern "C" lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options*
   if (!approximate && !(features & LSP_FEATURE_EXACT))
     return refuse(error, "the file has no exact tree, trace it approximately or bake it without --no-exact");
   uint32_t flags = options->flags & (approximate ? kApproximateFlags : kExactFlags);
-  if (!(features & LSP_FEATURE_BINARY)) flags &= ~LSP_TRACE_SKIP_EMPTY;  // no Line Space is conservative
+  constexpr uint32_t kConservative = LSP_FEATURE_LINE_SPACES | LSP_FEATURE_BINARY;  // what such a file has
+  if ((features & kConservative) != kConservative) flags &= ~LSP_TRACE_SKIP_EMPTY;
   if (flags & LSP_TRACE_NEAR_APPROXIMATE) flags &= ~LSP_TRACE_NEAR_SKIP;
   const bool ntree = scene->header->base_structure == LSP_BASE_NTREE;
   const lsp::TraceLoops& loops = ntree ? lsp::kNTreeLoops : lsp::kBvhLoops;

@@ -397,7 +397,8 @@ VulkanTrace VulkanTracer::Impl::trace(const lsp_trace_options& wanted, std::span
   options.flags &= (wanted.flags & LSP_TRACE_APPROXIMATE) != 0 ? LSP_TRACE_ALL_FLAGS & ~LSP_TRACE_SKIP_EMPTY
                                                                : LSP_TRACE_ANY_HIT | LSP_TRACE_SKIP_EMPTY;
   if ((options.flags & LSP_TRACE_NEAR_APPROXIMATE) != 0) options.flags &= ~LSP_TRACE_NEAR_SKIP;
-  if (scene_.header == nullptr || (scene_.header->required_features & LSP_FEATURE_BINARY) == 0)
+  constexpr uint32_t kConservative = LSP_FEATURE_LINE_SPACES | LSP_FEATURE_BINARY;  // what such a file has
+  if (scene_.header == nullptr || (scene_.header->required_features & kConservative) != kConservative)
     options.flags &= ~LSP_TRACE_SKIP_EMPTY;
   uint32_t needed = (options.flags & LSP_TRACE_APPROXIMATE) != 0 ? LSP_USE_APPROXIMATE : LSP_USE_EXACT;
   if ((options.flags & LSP_TRACE_SKIP_EMPTY) != 0) needed |= LSP_USE_APPROXIMATE;
