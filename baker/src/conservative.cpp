@@ -45,9 +45,18 @@ void clip(Polygon& polygon, F&& f) {
     (value[i] <= 0 ? any_in : any_out) = true;
   }
   if (!any_out) return;
+  if (!any_in) {
+    polygon.count = 0;
+    return;
+  }
+  // A polygon that is thinner than rounding may seem to cross the line more than twice: it stays whole, which
+  // errs to the safe side and keeps the corners few.
+  int crossings = 0;
+  for (int i = 0; i < polygon.count; ++i)
+    crossings += (value[i] <= 0) != (value[i + 1 == polygon.count ? 0 : i + 1] <= 0);
+  if (crossings != 2) return;
   const Polygon old = polygon;
   polygon.count = 0;
-  if (!any_in) return;
   for (int i = 0; i < old.count; ++i) {
     const int next = i + 1 == old.count ? 0 : i + 1;
     if (value[i] <= 0) polygon.push(old.x[0][i], old.x[1][i], old.x[2][i]);
