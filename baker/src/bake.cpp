@@ -128,6 +128,21 @@ std::string with_commas(uint64_t n) {
   return {reversed.rbegin(), reversed.rend()};
 }
 
+lsp_scene view(const Baked& baked) {
+  lsp_scene scene{};
+  scene.header = &baked.header;
+  scene.nodes = baked.nodes.data();
+  scene.grid = baked.ntree.grid.data();
+  scene.cells = baked.ntree.cells.data();
+  scene.references = baked.ntree.references.data();
+  scene.triangles = baked.triangles.data();
+  scene.line_spaces = baked.line_spaces.records.data();
+  scene.bit_words = baked.line_spaces.words.data();
+  scene.candidates = baked.line_spaces.candidates.data();
+  scene.normals = baked.normals.empty() ? nullptr : baked.normals.data();
+  return scene;
+}
+
 void set_counts(Baked& baked) {
   LspHeader& h = baked.header;
   h.node_count = h.base_structure == LSP_BASE_NTREE ? baked.ntree.node_count : uint32_t(baked.nodes.size());

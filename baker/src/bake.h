@@ -11,6 +11,7 @@
 #include "bvh.h"
 #include "line_space.h"
 #include "lsp/layout.h"
+#include "lsp/lsp.h"
 #include "mesh.h"
 #include "ntree.h"
 
@@ -65,6 +66,9 @@ Baked bake(const Mesh& mesh, const BakeOptions& options, const Progress& progres
 // Leaves out of `baked` what only exact traces need: nodes below terminal Line Spaces and the triangles there
 // that no shaft refers to.
 void keep_approximate_only(Baked& baked);
+
+// The bake as a scene to trace; it points into `baked`.
+lsp_scene view(const Baked& baked);
 
 // Sets the header's counts, and what follows from them, to those of the sections.
 void set_counts(Baked& baked);

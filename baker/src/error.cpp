@@ -38,21 +38,6 @@ glm::dvec3 cosine_direction(const glm::dvec3& n, uint64_t ray) {
   return glm::normalize(n * (1 + 1e-9) + on_sphere);
 }
 
-lsp_scene view(const Baked& baked) {
-  lsp_scene scene{};
-  scene.header = &baked.header;
-  scene.nodes = baked.nodes.data();
-  scene.grid = baked.ntree.grid.data();
-  scene.cells = baked.ntree.cells.data();
-  scene.references = baked.ntree.references.data();
-  scene.triangles = baked.triangles.data();
-  scene.line_spaces = baked.line_spaces.records.data();
-  scene.bit_words = baked.line_spaces.words.data();
-  scene.candidates = baked.line_spaces.candidates.data();
-  scene.normals = baked.normals.empty() ? nullptr : baked.normals.data();
-  return scene;
-}
-
 }  // namespace
 
 MeasuredError measure_error(const Baked& baked, uint64_t rays) {

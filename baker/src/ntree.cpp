@@ -15,6 +15,7 @@ namespace lsp {
 namespace {
 
 using Cell3 = glm::ivec3;
+constexpr float kLeastCell = 2;  // margins
 
 glm::dvec3 vec(const lsp_float3& v) { return {v.x, v.y, v.z}; }
 
@@ -62,7 +63,10 @@ class Builder {
     // What a traversal's rounding may shift a ray by, for origins up to four edges away (lsp/ntree.h); the
     // cube holds the scene with as much to spare.
     tree_.margin = edge * 0x1p-18f + farthest * 0x1p-20f + 0x1p-126f;
-    tree_.size = (edge + 4 * tree_.margin) * (1 + 0x1p-20f);
+    // Cells under two margins would hold each other's triangles: the cube grows, and cells are cut no
+    // further.
+    tree_.size = std::max(edge + 4 * tree_.margin, kLeastCell * tree_.margin * float(options.branching)) *
+                 (1 + 0x1p-20f);
     const glm::vec3 lo = bounds.lo + 0.5f * (extent - tree_.size);
     tree_.lo = {lo.x, lo.y, lo.z};
     tree_.branching = options.branching;
@@ -128,9 +132,8 @@ class Builder {
     for (uint32_t c = 0; c < cell_count; ++c)
       if (begin[c + 1] > begin[c]) filled.push_back(c);
     const auto count_of = [&](uint32_t c) { return begin[c + 1] - begin[c]; };
-    const auto is_cut = [&](uint32_t c) {
-      return level < options_.levels && count_of(c) > options_.leaf_triangles;
-    };
+    const bool can_cut = level < options_.levels && cell / n >= double(kLeastCell * tree_.margin);
+    const auto is_cut = [&](uint32_t c) { return can_cut && count_of(c) > options_.leaf_triangles; };
 
     std::vector<Subtree> below(filled.size());
     std::atomic<size_t> done{0};

@@ -184,22 +184,7 @@ TEST(Conservative, SetsFewBitsThatNoLineNeeds) {
   EXPECT_LT(double(set), 1.1 * double(needed));
 }
 
-// ---- whole bakes and the tracer's rounding
-// ------------------------------------------------------------------
-
-lsp_scene view(const Baked& b) {
-  lsp_scene s{};
-  s.header = &b.header;
-  s.nodes = b.nodes.data();
-  s.triangles = b.triangles.data();
-  s.line_spaces = b.line_spaces.records.data();
-  s.bit_words = b.line_spaces.words.data();
-  s.candidates = b.line_spaces.candidates.data();
-  s.grid = b.ntree.grid.data();
-  s.cells = b.ntree.cells.data();
-  s.references = b.ntree.references.data();
-  return s;
-}
+// ---- whole bakes and the tracer's rounding ----
 
 BakeOptions options_for(Base base, uint32_t n, std::vector<uint32_t> depths, bool directed = false) {
   BakeOptions options;

@@ -23,18 +23,6 @@ BakeOptions small(uint32_t n, std::vector<uint32_t> depths) {
   return options;
 }
 
-lsp_scene view(const Baked& b) {
-  lsp_scene s{};
-  s.header = &b.header;
-  s.nodes = b.nodes.data();
-  s.triangles = b.triangles.data();
-  s.normals = b.normals.empty() ? nullptr : b.normals.data();
-  s.line_spaces = b.line_spaces.records.data();
-  s.bit_words = b.line_spaces.words.data();
-  s.candidates = b.line_spaces.candidates.data();
-  return s;
-}
-
 LspHit trace(const Baked& baked, const LspRay& ray, uint32_t flags, lsp_trace_counts* counts = nullptr) {
   const lsp_scene scene = view(baked);
   const lsp_trace_options options = {flags, 0};

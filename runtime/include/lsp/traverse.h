@@ -1,7 +1,7 @@
 /* Exact and approximate traversal of an .lsp scene, in the common subset of GLSL 4.6 and C++20: of a BVH, or
  * with LSP_NTREE defined of an NTree.
  *
- * lsp.glsl includes this file in shaders, runtime/src/trace.cpp in the library: one text, so that both give
+ * lsp.glsl includes this file in shaders, runtime/src/trace_loops.inc in the library: one text, so that both give
  * the same bits. That holds where the compiler contracts nothing (LSP_PRECISE, -ffp-contract=off), rounds
  * division and square root correctly, and evaluates what stands here: min and max are written out because
  * their answers to NaN are not the same everywhere.
