@@ -154,7 +154,8 @@ Exit run(Arguments a) {
     throw Failure(Exit::kUsage, "", "--max-error chooses among BVHs, leave out --base");
   if (!a.resolution_given) a.resolution = preset.resolution;
   if (ntree && !a.branching) a.branching = std::clamp(a.resolution, 2u, LSP_MAX_BRANCHING);
-  // At depth 1 an NTree's error costs the fewest bytes: bunny, N = 6, 1.2 % wrong and 13 MB against 0.3 % and 142 MB.
+  // At depth 1 an NTree's error costs the fewest bytes: bunny, N = 6, 1.2 % wrong and 13 MB against 0.3 % and
+  // 142 MB.
   if (!a.depth_given) a.depths = {ntree ? std::min(a.levels - 1, 1u) : preset.depth};
   if (!a.samples_given) a.samples = preset.samples;
   if (a.no_line_spaces && a.no_exact)
@@ -323,11 +324,12 @@ int main(int argc, char** argv) {
   auto* resolution =
       app.add_option("--resolution", a.resolution, "N: patches along an edge of a Line Space's box")
           ->check(CLI::Range(1u, LSP_MAX_RESOLUTION));
-  auto* depth =
-      app.add_option("--depth", a.depths,
-                     "D: depth of the nodes with a Line Space; several, as 6,9,12, give levels of detail")
-          ->delimiter(',')
-          ->check(CLI::Range(0u, 40u));
+  auto* depth = app.add_option("--depth", a.depths,
+                               "D: depth of the nodes with a Line Space; several, as 6,9,12, give levels of "
+                               "detail; an NTree's is 1 "
+                               "where nothing is said")
+                    ->delimiter(',')
+                    ->check(CLI::Range(0u, 40u));
   app.add_option("--triangles", a.triangles, "T: nodes above D with fewer triangles get a Line Space too");
   auto* samples =
       app.add_option("--samples", a.samples,
@@ -340,12 +342,14 @@ int main(int argc, char** argv) {
                                                                          {"glossy", Purpose::kGlossy},
                                                                          {"all", Purpose::kAll}}))
       ->default_str("all");
-  app.add_flag("--conservative", a.conservative,
-               "With --for visibility: a shaft counts as empty only where no triangle touches it, so that exact "
-               "rays may skip it (lsp-trace --skip-empty)");
-  app.add_flag("--directed", a.directed,
-               "With --for visibility: a bit for either direction of a shaft, 30 N^4 and not 15 N^4; both are "
-               "alike, what is inside does not depend on the direction");
+  app.add_flag(
+      "--conservative", a.conservative,
+      "With --for visibility: a shaft counts as empty only where no triangle touches it, so that exact "
+      "rays may skip it (lsp-trace --skip-empty)");
+  app.add_flag(
+      "--directed", a.directed,
+      "With --for visibility: a bit for either direction of a shaft, 30 N^4 and not 15 N^4; both are "
+      "alike, what is inside does not depend on the direction");
   app.add_flag("--exact", a.exact, "Keep the exact tree below the Line Spaces (the default)");
   app.add_flag("--no-exact", a.no_exact, "Keep only what approximate rays need");
   app.add_flag("--no-line-spaces", a.no_line_spaces, "Bake the exact tree alone");
@@ -353,7 +357,9 @@ int main(int argc, char** argv) {
   app.add_option("--align", a.align, "Alignment of sections in bytes")
       ->check(CLI::IsMember({256, 4096, 65536}));
   app.add_option("--threads", a.threads, "Threads, 0: all cores");
-  app.add_option("--memory-limit", a.memory_limit, "Memory the bake may use, as 2GiB; 0: no limit")
+  app.add_option("--memory-limit", a.memory_limit,
+                 "Memory the bake may use, as 2GiB; Line Spaces beyond it wait in temporary files beside the "
+                 "output; 0: no limit")
       ->transform(CLI::AsSizeValue(false));
   app.add_option(
          "--normal-angle", a.normal_angle,

@@ -4,12 +4,7 @@
 
 /* Traces from the root. flags: LSP_TRACE_*_BIT. */
 LSP_FN LspBest lsp_traverse(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod LSP_COUNTS_PARAM) {
-  LspBest best;
-  best.t = s.tmax;
-  best.u = 0.0f;
-  best.v = 0.0f;
-  best.triangle = LSP_NONE;
-  best.flags = 0u;
+  LspBest best = lsp_no_best(s);
 
   uint stack_ref[LSP_STACK_SIZE];
   float stack_t[LSP_STACK_SIZE];

@@ -62,12 +62,7 @@ LSP_FN uint lsp_ntree_next_filled(LSP_SCENE_ uint first_word, uint cell, uint ce
 
 /* Traces from the root. flags: LSP_TRACE_*_BIT. */
 LSP_FN LspBest lsp_traverse(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod LSP_COUNTS_PARAM) {
-  LspBest best;
-  best.t = s.tmax;
-  best.u = 0.0f;
-  best.v = 0.0f;
-  best.triangle = LSP_NONE;
-  best.flags = 0u;
+  LspBest best = lsp_no_best(s);
 
   /* stack[1 + depth]: the node left for its child; stack[0]: as in lsp/bvh.h. */
   uint stack[LSP_MAX_NTREE_DEPTH + 1u];

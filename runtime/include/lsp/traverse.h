@@ -86,6 +86,18 @@ struct LspBest {
   bool complete; /* the traversal ran to its end */
 };
 
+/* What a traversal starts from: nothing nearer than tmax. */
+LSP_FN LspBest lsp_no_best(LSP_IN(LspSetup) s) {
+  LspBest best;
+  best.t = s.tmax;
+  best.u = 0.0f;
+  best.v = 0.0f;
+  best.triangle = LSP_NONE;
+  best.flags = 0u;
+  best.complete = false;
+  return best;
+}
+
 LSP_FN float lsp_min(float a, float b) { return b < a ? b : a; }
 LSP_FN float lsp_max(float a, float b) { return a < b ? b : a; }
 
