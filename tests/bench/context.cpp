@@ -25,8 +25,52 @@ class VulkanFile : public Tracer {
 
 }  // namespace
 
+void Context::guarded(Section& section, const std::string& what, const std::function<void()>& work) {
+  std::string message;
+  try {
+    work();
+    return;
+  } catch (const Failure& failure) {
+    message = (failure.file().empty() ? "" : failure.file() + ": ") + failure.what();
+    if (!first_failure) first_failure = failure;
+  } catch (const std::bad_alloc&) {
+    message = "out of memory";
+    if (!first_failure) first_failure = Failure(Exit::kLimit, what, message);
+  } catch (const std::exception& error) {
+    message = error.what();
+    if (!first_failure) first_failure = Failure(Exit::kInternal, what, message);
+  }
+  message = section.id + ", " + what + ", failed: " + message;
+  section.paragraphs.push_back(message + ". What follows lacks it.");
+  warnings.push_back(message);
+}
+
+void Context::each_scene(Section& section, const std::function<void(SceneUnderTest&)>& work) {
+  for (const auto& scene : scenes) {
+    progress(section.id + ": " + scene->name());
+    guarded(section, scene->name(), [&] { work(*scene); });
+  }
+}
+
+std::vector<Timing> Context::race_on_vulkan(Tracer& tracer, std::span<const Mode> modes,
+                                            std::span<const LspRay> rays, int repeats,
+                                            const std::string& what) {
+  std::vector<LspHit> hits(rays.size());
+  std::vector<Contender> contenders;
+  for (const Mode& mode : modes) {
+    contenders.push_back({mode.name(), [&, mode] { return tracer.trace(mode, rays, hits); }});
+  }
+  try {
+    return race(contenders, 1, repeats);
+  } catch (const Failure& failure) {
+    warnings.push_back(what + ": the Vulkan device failed and is left alone from here on: " + failure.what());
+    vulkan_failed_ = true;
+    return {};
+  }
+}
+
 std::unique_ptr<Tracer> Context::vulkan_tracer(const OpenFile& file, const std::string& what) {
-  if (!vulkan) return nullptr;
+  if (!vulkan || vulkan_failed_) return nullptr;
   try {
     return std::make_unique<VulkanFile>(*vulkan, file);
   } catch (const Failure& failure) {
@@ -65,6 +109,8 @@ void add_errors(Json& row, const RayErrors& errors) {
   row["depth_p95_percent"] = 100 * errors.depth_diagonal.p95;
   row["depth_p99_percent"] = 100 * errors.depth_diagonal.p99;
   row["depth_distance_percent"] = 100 * errors.depth_distance.mean;
+  row["depth_distance_p95_percent"] = 100 * errors.depth_distance.p95;
+  row["depth_distance_p99_percent"] = 100 * errors.depth_distance.p99;
   row["normal_degrees"] = errors.normal_degrees.mean;
   row["wrong_primitive_percent"] = 100 * static_cast<double>(errors.wrong_primitive) / hits;
 }
@@ -77,6 +123,8 @@ std::vector<Column> error_columns() {
           {"depth_p95_percent", "95th", 3},
           {"depth_p99_percent", "99th", 3},
           {"depth_distance_percent", "% of distance", 2},
+          {"depth_distance_p95_percent", "95th", 2},
+          {"depth_distance_p99_percent", "99th", 2},
           {"normal_degrees", "normal, degrees", 2},
           {"wrong_primitive_percent", "other primitive %", 1}};
 }

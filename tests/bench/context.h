@@ -4,9 +4,12 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "answers.h"
+#include "lsp/program.h"
 #include "lsp/vulkan_device.hpp"
 #include "ray_errors.h"
 #include "report.h"
@@ -24,19 +27,35 @@ struct Context {
   std::unique_ptr<VulkanTracer> vulkan;  // null: no device; why is in the report's facts
   std::function<void(const std::string&)> progress;
   std::vector<std::string> warnings;
-  std::vector<std::string> answers;
+  Answers answers;
+  std::optional<Failure> first_failure;  // of a scene or suite; the report is written all the same
 
-  size_t accuracy_rays() const { return quick ? 50000 : 200000; }
-  size_t timing_rays() const { return quick ? 1u << 16 : 1u << 17; }
-  Bake base_bake() const { return line_space_bake(quick ? 4 : 6, 9); }  // the only one of a quick run
+  size_t accuracy_rays() const { return quick ? 30000 : 200000; }
+  size_t timing_rays() const { return quick ? 1u << 15 : 1u << 17; }
+  Bake base_bake() const { return line_space_bake(quick ? 4 : 6, 9); }  // the only BVH of a quick run
   int repeats() const { return quick ? 3 : 5; }
+
+  // Runs `work` for every scene in turn. What one scene throws becomes a line of the section and a warning;
+  // the others go on.
+  void each_scene(Section& section, const std::function<void(SceneUnderTest&)>& work);
+
+  // Runs `work` and makes what it throws a line of the section and a warning.
+  void guarded(Section& section, const std::string& what, const std::function<void()>& work);
 
   // The file on the Vulkan device, until the next call; null, with a warning where there is a device,
   // without.
   std::unique_ptr<Tracer> vulkan_tracer(const OpenFile& file, const std::string& what);
 
+  // Every mode on the Vulkan device, raced; empty, with a warning, where the device fails, which is then left
+  // alone for the rest of the run.
+  std::vector<Timing> race_on_vulkan(Tracer& tracer, std::span<const Mode> modes,
+                                     std::span<const LspRay> rays, int repeats, const std::string& what);
+
   // a is `times` faster than b; says so with a warning when the repeats lie too far apart for that.
   double speed_up(const std::string& what, const Timing& a, const Timing& b);
+
+ private:
+  bool vulkan_failed_ = false;
 };
 
 // Rows of a table that only some of the scenes have must not be hidden: every suite lists what it left out.

@@ -1,9 +1,11 @@
 // lsp-bench: run time against error, for scenes given as meshes or .lsp files.
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
 
+#include "answers.h"
 #include "context.h"
 #include "lsp/command_line.h"
 #include "machine.h"
@@ -28,22 +30,124 @@ constexpr Suite kSuites[] = {{"pareto", pareto_suite},   {"peers", peers_suite},
                              {"paper", paper_suite},     {"pictures", pictures_suite},
                              {"scaling", scaling_suite}, {"stress", stress_suite}};
 
+// What the run has used so far: this process and the programs that it ran.
+struct Cost {
+  double wall = 0, cpu = 0;
+  static Cost so_far() {
+    Cost cost{seconds_since_start(), 0};
+    for (const int who : {RUSAGE_SELF, RUSAGE_CHILDREN}) {
+      rusage usage{};
+      getrusage(who, &usage);
+      for (const timeval& time : {usage.ru_utime, usage.ru_stime})
+        cost.cpu += static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+    }
+    return cost;
+  }
+};
+
+// Two inputs may have one stem; what is measured may not have one name.
+std::string unique_name(const Context& context, const std::string& scene) {
+  const std::string stem = std::filesystem::path(scene).stem().string();
+  const auto taken = [&](const std::string& name) {
+    return std::any_of(context.scenes.begin(), context.scenes.end(),
+                       [&](const auto& other) { return other->name() == name; });
+  };
+  std::string name = stem;
+  for (int k = 2; taken(name); ++k) name = stem + "-" + std::to_string(k);
+  return name;
+}
+
+// The run's report as far as it has come.
+class RunningReport {
+ public:
+  RunningReport(Context& context, std::filesystem::path directory)
+      : context_(context), directory_(std::move(directory)) {
+    report_.title = "Line Spaces: run time against error";
+    costs_ = {
+        "costs",
+        "Seconds that this report took",
+        "Processor time is that of all threads and of the programs that were run, bakes for the most part.",
+        {{"suite", "suite"}, {"wall", "wall clock", 1}, {"cpu", "processor", 1}},
+        {}};
+  }
+
+  Json& facts() { return report_.facts; }
+  const Report& report() const { return report_; }
+
+  void add_cost(const std::string& what, const Cost& since) {
+    const Cost now = Cost::so_far();
+    costs_.rows.push_back({{"suite", what}, {"wall", now.wall - since.wall}, {"cpu", now.cpu - since.cpu}});
+  }
+
+  // Whatever comes later, what is there by now stands in the folder.
+  void write(const std::vector<Section>& sections, bool finished) {
+    report_.answers = sentences(context_.answers);
+    report_.warnings = context_.warnings;
+    size_t bakes = 0, earlier = 0;
+    for (const auto& scene : context_.scenes) {
+      for (const auto& [name, baked] : scene->bakes()) {
+        bakes += baked.available && !scene->is_file();
+        earlier += baked.from_earlier_run;
+      }
+    }
+    report_.facts["bakes"] = std::to_string(bakes);
+    if (earlier > 0) {
+      report_.warnings.insert(
+          report_.warnings.begin(),
+          "Of " + std::to_string(bakes) + " bakes " + std::to_string(earlier) +
+              " are from an earlier run with the same program, input and options; so are their "
+              "times and memory. Remove the subfolder bakes to measure them anew.");
+    }
+    report_.facts["run time"] = std::to_string(static_cast<int>(seconds_since_start())) + " s" +
+                                (context_.quick ? ", --quick" : "") +
+                                (finished ? "" : "; the run has not ended yet");
+    report_.sections = sections;
+    Section cost{"cost", "What this report took", {}, {}, {}, {costs_}};
+    report_.sections.push_back(cost);
+    report_.sections.push_back(answers_section(context_.answers));
+    write_report(report_, directory_);
+  }
+
+ private:
+  Context& context_;
+  std::filesystem::path directory_;
+  Report report_;
+  Table costs_;
+};
+
+void add_scenes(Context& context, const Arguments& arguments) {
+  for (const std::string& scene : arguments.scenes) {
+    if (!std::filesystem::exists(scene)) throw Failure(Exit::kFile, scene, "does not exist");
+  }
+  for (const std::string& scene : arguments.scenes) {
+    context.progress("bake " + scene);
+    try {
+      context.scenes.push_back(std::make_unique<SceneUnderTest>(scene, context.cache, context.base_bake(),
+                                                                unique_name(context, scene)));
+    } catch (const Failure& failure) {
+      context.warnings.push_back(scene + ": left out: " + failure.what());
+      if (!context.first_failure) context.first_failure = failure;
+    }
+  }
+  if (context.scenes.empty()) throw *context.first_failure;
+}
+
 void run(const Arguments& arguments, const CommonOptions& common) {
   namespace fs = std::filesystem;
   Context context;
   context.quick = arguments.quick;
   context.cache = fs::path(arguments.output) / "bakes";
   context.threads = arguments.threads ? arguments.threads : machine_threads();
+  context.answers.threads = context.threads;
   const bool show = !common.quiet && isatty(2);
   context.progress = [show](const std::string& what) {
     if (show)
       std::cerr << "\r\033[K" << static_cast<int>(seconds_since_start()) << " s  " << what << std::flush;
   };
   seconds_since_start();
-  Report report;
-  report.title = "Line Spaces: run time against error";
-  report.facts = machine_facts();
-  report.facts["threads"] = context.threads;
+  RunningReport running(context, arguments.output);
+  running.facts() = machine_facts();
+  running.facts()["threads"] = context.threads;
   if (machine_load() > 0.5) {
     context.warnings.push_back("The machine was busy before the run began (load " +
                                std::to_string(machine_load()) +
@@ -52,29 +156,29 @@ void run(const Arguments& arguments, const CommonOptions& common) {
   std::string why = "switched off";
   if (!arguments.no_vulkan && VulkanTracer::available(&why)) {
     context.vulkan = std::make_unique<VulkanTracer>();
-    report.facts["Vulkan"] = context.vulkan->device_name();
+    context.answers.device = context.vulkan->device_name();
+    running.facts()["Vulkan"] = context.answers.device;
   } else {
-    report.facts["Vulkan"] = "not measured: " + why;
+    running.facts()["Vulkan"] = "not measured: " + why;
   }
-  for (const std::string& scene : arguments.scenes) {
-    if (!fs::exists(scene)) throw Failure(Exit::kFile, scene, "does not exist");
-  }
-  for (const std::string& scene : arguments.scenes) {
-    context.progress("bake " + scene);
-    context.scenes.push_back(std::make_unique<SceneUnderTest>(scene, context.cache, context.base_bake()));
-  }
+  Cost cost = Cost::so_far();
+  add_scenes(context, arguments);
+  running.add_cost("first bakes, truth", cost);
+  std::vector<Section> sections;
   for (const Suite& suite : kSuites) {
     if (!arguments.suites.empty() &&
         std::find(arguments.suites.begin(), arguments.suites.end(), suite.name) == arguments.suites.end()) {
       continue;
     }
-    report.sections.push_back(suite.run(context));
+    cost = Cost::so_far();
+    Section section{suite.name, suite.name, {}, {}, {}, {}};
+    context.guarded(section, "the whole suite", [&] { section = suite.run(context); });
+    sections.push_back(std::move(section));
+    running.add_cost(suite.name, cost);
+    running.write(sections, false);
   }
-  report.answers = context.answers;
-  report.warnings = context.warnings;
-  report.facts["run time"] =
-      std::to_string(static_cast<int>(seconds_since_start())) + " s" + (context.quick ? ", --quick" : "");
-  write_report(report, arguments.output);
+  running.write(sections, true);
+  const Report& report = running.report();
   if (show) std::cerr << "\r\033[K";
   if (common.json) {
     std::cout << to_json(report).dump(1) << "\n";
@@ -82,6 +186,10 @@ void run(const Arguments& arguments, const CommonOptions& common) {
     for (const std::string& answer : report.answers) std::cout << answer << "\n";
     for (const std::string& warning : report.warnings) std::cout << "warning: " << warning << "\n";
     std::cout << "report: " << (fs::path(arguments.output) / "report.html").string() << "\n";
+  }
+  if (context.first_failure) {
+    throw Failure(context.first_failure->exit(), context.first_failure->file(),
+                  std::string(context.first_failure->what()) + "; the report has everything else");
   }
 }
 
@@ -97,12 +205,14 @@ int main(int argc, char** argv) {
   app.add_option("SCENE", arguments.scenes,
                  "Mesh files, baked in several ways, or .lsp files, measured as they are")
       ->required();
-  app.add_option("-o,--output", arguments.output, "Folder for the report; bakes go to its subfolder bakes")
+  app.add_option("-o,--output", arguments.output,
+                 "Folder for the report; bakes go to its subfolder bakes, where a later run finds them")
       ->required();
   app.add_option("--suite", arguments.suites,
-                 "paper, pareto, scaling, peers, stress or pictures; may be repeated (default: all)")
+                 "paper, pareto, scaling, peers, stress or pictures; may be repeated (default: all, 30 "
+                 "minutes for six scenes on two cores)")
       ->check(CLI::IsMember({"paper", "pareto", "scaling", "peers", "stress", "pictures"}));
-  app.add_flag("--quick", arguments.quick, "Fewer rays, bakes and sizes: minutes become seconds");
+  app.add_flag("--quick", arguments.quick, "Fewer rays, bakes and sizes: under two minutes for six scenes");
   app.add_flag("--no-vulkan", arguments.no_vulkan, "Measure the CPU only");
   app.add_option("--threads", arguments.threads, "What 'all threads' means (default: all)")
       ->check(CLI::Range(1, 1024));

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "embree_scene.h"
+#include "lsp/program.h"
 #include "open_file.h"
 #include "rays.h"
 #include "report.h"
@@ -22,15 +23,19 @@ struct Bake {
 
 Bake line_space_bake(unsigned resolution, unsigned depth);
 
-// What a bake cost. `available` is false where lsp-bake says that it does not support the options (exit 5).
+// An NTree of `branching` cells an edge and Line Spaces of that resolution at `depth`.
+Bake ntree_bake(unsigned branching, unsigned depth);
+
+// What a bake cost. `available` is false where lsp-bake could not or would not.
 struct Baked {
   bool available = true;
-  std::string reason;  // why it is not available
+  bool from_earlier_run = false;  // found in the cache: seconds and memory are that run's
+  std::string reason;             // why it is not available, lsp-bake's own words
+  Exit exit = Exit::kDone;        // lsp-bake's exit code
   std::filesystem::path path;
   double seconds = 0;
   uint64_t peak_bytes = 0;
   uint64_t file_bytes = 0;
-  Json report;  // lsp-bake's own JSON; empty for a scene that was given as .lsp
 };
 
 // Rays of one kind with their truth by Embree in robust mode.
@@ -45,9 +50,10 @@ struct RaySet {
 class SceneUnderTest {
  public:
   // `input` is a mesh file, or an .lsp file, which is then measured as it is. Bakes go to `cache`. `first` is
-  // baked at once to know the triangles; the default is the paper's N = 6, D = 9. Throws Failure.
+  // baked at once to know the triangles; the default is the paper's N = 6, D = 9. `name` is what tables and
+  // bakes are called by: empty, the input's stem. Throws Failure.
   SceneUnderTest(const std::filesystem::path& input, const std::filesystem::path& cache,
-                 const Bake& first = line_space_bake(6, 9));
+                 const Bake& first = line_space_bake(6, 9), const std::string& name = "");
 
   const std::string& name() const { return name_; }
   bool is_file() const { return is_file_; }  // given as .lsp: there is one bake only
@@ -55,10 +61,11 @@ class SceneUnderTest {
   const EmbreeScene& reference() const { return *reference_; }
   const Camera& camera() const { return camera_; }
 
-  // Bakes once and remembers; of a scene given as .lsp only base() exists, others are not available. Throws
-  // Failure where lsp-bake fails for any reason but an option it does not support.
+  // Bakes once and remembers, beyond this run too (bake_cache.h); of a scene given as .lsp only base()
+  // exists, others are not available.
   const Baked& bake(const Bake& how);
   const Baked& base();  // what was baked first, or the file given
+  const std::map<std::string, Baked>& bakes() const { return bakes_; }  // so far, by name
 
   // The accuracy rays: area-weighted, cosine, shuffled. Made once per count.
   const RaySet& surface(size_t count);

@@ -1,30 +1,41 @@
 // Run time against error against bytes: every bake crossed with every way to trace it, and the frontier.
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <map>
 
 #include "context.h"
 #include "ray_errors.h"
+#include "wide_tree.h"
 
 namespace lsp::bench {
 namespace {
 
+// What is swept: add a line to try a setting. --quick bakes Context::base_bake() alone.
+struct Swept {
+  const char* name;
+  std::vector<std::string> options;
+};
+const std::vector<Swept>& swept() {
+  static const std::vector<Swept> all = {
+      {"N4-D9", {"--resolution", "4", "--depth", "9"}},
+      {"N6-D9", {"--resolution", "6", "--depth", "9"}},
+      {"N4-D9-T64", {"--resolution", "4", "--depth", "9", "--triangles", "64"}},
+      {"N4-D6,9,12", {"--resolution", "4", "--depth", "6,9,12"}},
+      {"N2-D12", {"--resolution", "2", "--depth", "12"}},
+      {"N4-D12", {"--resolution", "4", "--depth", "12"}},
+      {"N6-D12-S1", {"--resolution", "6", "--depth", "12", "--samples", "1"}},
+      {"preset-fast", {"--preset", "fast"}},
+      {"preset-accurate", {"--preset", "accurate"}},
+      {"NT6-N6-D1", {"--base", "ntree", "--resolution", "6", "--depth", "1"}},
+      {"NT16-N4-D1",
+       {"--base", "ntree", "--branching", "16", "--levels", "2", "--resolution", "4", "--depth", "1"}},
+  };
+  return all;
+}
+
 std::vector<Bake> bakes(const Context& context) {
   if (context.quick) return {context.base_bake()};
-  std::vector<Bake> all = {line_space_bake(4, 9), line_space_bake(6, 9)};
-  all.push_back({"N4-D6,9,12", {"--resolution", "4", "--depth", "6,9,12"}});
-  all.push_back(line_space_bake(2, 12));
-  all.push_back(line_space_bake(4, 12));
-  all.push_back(line_space_bake(6, 12));
-  all.push_back({"N3-D9,12,15", {"--resolution", "3", "--depth", "9,12,15"}});
-  for (const char* preset : {"fast", "accurate"}) {
-    all.push_back({std::string("preset-") + preset, {"--preset", preset}});
-  }
-  all.push_back({"NT6-N6-D1", {"--base", "ntree", "--resolution", "6", "--depth", "1"}});
-  all.push_back(
-      {"NT16-N4-D1",
-       {"--base", "ntree", "--branching", "16", "--levels", "2", "--resolution", "4", "--depth", "1"}});
+  std::vector<Bake> all;
+  for (const Swept& one : swept()) all.push_back({one.name, one.options});
   return all;
 }
 
@@ -49,22 +60,13 @@ std::vector<Mode> modes_for(const OpenFile& file, bool quick) {
   std::vector<Mode> modes = {{.approximate = true},
                              {.approximate = true, .near_skip = true},
                              {.approximate = true, .near_approximate = true}};
-  if (!has_levels(file)) return modes;
-  if (quick) {
-    modes.push_back({.approximate = true, .lod = 0.5f});
-    return modes;
-  }
+  if (quick || !has_levels(file)) return modes;
   for (const float lod : {0.25f, 0.5f, 1.0f}) {
     modes.push_back({.approximate = true, .lod = lod});
     modes.push_back({.approximate = true, .near_skip = true, .lod = lod});
   }
   return modes;
 }
-
-struct Sample {
-  std::string scene, bake, mode;
-  double times, times_vulkan, wrong_percent, depth_percent, megabytes;
-};
 
 // Marks what nothing else beats in both speed and `error`.
 std::vector<bool> frontier(const std::vector<Sample>& samples, double Sample::*error) {
@@ -80,166 +82,110 @@ std::vector<bool> frontier(const std::vector<Sample>& samples, double Sample::*e
   return best;
 }
 
-// The best speed at no more than `limit` % wrong answers, per scene; 1 (exact) where nothing approximate
-// helps.
-std::map<std::string, Sample> best_within(const std::vector<Sample>& samples, double limit,
-                                          double Sample::*times) {
-  std::map<std::string, Sample> best;
-  for (const Sample& sample : samples) {
-    const auto [it, fresh] =
-        best.try_emplace(sample.scene, Sample{sample.scene, "-", "exact", 1, 1, 0, 0, 0});
-    if (sample.wrong_percent <= limit && sample.*times > it->second.*times) it->second = sample;
+// How our exact trace compares with others on the very rays of the sweep.
+ScenePeers measure_peers(Context& context, SceneUnderTest& scene, const RaySet& set) {
+  ScenePeers peers;
+  if (!context.quick) {
+    const Baked& tree = scene.bake({"tree", {"--no-line-spaces"}});
+    if (tree.available) peers.exact_megabytes = static_cast<double>(tree.file_bytes) * 1e-6;
   }
-  return best;
+  const OpenFile file(scene.base().path);
+  if (is_ntree(file)) return peers;
+  const WideTree wide(file);
+  const std::unique_ptr<Tracer> tracers[] = {
+      cpu_tracer(file, context.threads),
+      embree_tracer(scene.reference(), EmbreeCall::kSingle, "Embree", context.threads),
+      wide_tracer(wide, context.threads)};
+  std::vector<LspHit> hits(set.rays.size());
+  std::vector<Contender> contenders;
+  for (const auto& tracer : tracers)
+    contenders.push_back({tracer->name(), [&] { return tracer->trace({}, set.rays, hits); }});
+  const std::vector<Timing> timings = race(contenders, 1, context.repeats());
+  peers.embree = timings[0].median / timings[1].median;
+  peers.wide = timings[0].median / timings[2].median;
+  return peers;
 }
 
-// "1.23x (geometric mean; 1.00x to 1.50x)"
-std::string range_of(const std::map<std::string, Sample>& best, double Sample::*times) {
-  double log_sum = 0, least = INFINITY, greatest = 0;
-  for (const auto& [name, sample] : best) {
-    log_sum += std::log(sample.*times);
-    least = std::min(least, sample.*times);
-    greatest = std::max(greatest, sample.*times);
-  }
-  char text[96];
-  std::snprintf(text, sizeof text, "%.2fx (%.2fx to %.2fx)",
-                std::exp(log_sum / static_cast<double>(best.size())), least, greatest);
-  return text;
-}
-
-// What one backend's frontier says, in a sentence each.
-void answer(Context& context, const std::vector<Sample>& samples, double Sample::*times,
-            const std::string& where) {
-  std::string sentence =
-      where +
-      ", shuffled diffuse rays, the fastest approximate trace is, times the exact one (geometric "
-      "mean of " +
-      std::to_string(context.scenes.size()) + " scenes, least to greatest): ";
-  const char* separator = "";
-  for (const double limit : {0.1, 0.5, 1.0, 2.0}) {
-    char share[64];
-    std::snprintf(share, sizeof share, "%sat %g %% wrong answers ", separator, limit);
-    sentence += share + range_of(best_within(samples, limit, times), times);
-    separator = "; ";
-  }
-  context.answers.push_back(sentence + ".");
-  std::string useless;
-  for (const auto& [name, sample] : best_within(samples, 1, times)) {
-    if (sample.*times < 1.1) useless += (useless.empty() ? "" : ", ") + name;
-  }
-  if (!useless.empty()) {
-    context.answers.push_back(
-        where + ", it is not worth using (under 1.1x at 1 % wrong answers) on: " + useless + ".");
-  }
-}
-
-}  // namespace
-
-Section pareto_suite(Context& context) {
-  Section section{"pareto", "Run time against error", {}, {}, {}, {}};
-  section.paragraphs.push_back(
-      "Every bake, traced in every way, on shuffled diffuse rays from what a camera sees, all threads. Speed "
-      "is "
-      "times the exact trace of the BVH in the same run, for NTrees too; wrong answers are rays that hit "
-      "where truth "
-      "misses "
-      "or the reverse. On the frontier nothing else is both faster and less often wrong.");
+struct Sweep {
   std::vector<Sample> samples;
-  std::vector<Json> rows;
+  std::vector<Json> rows;  // of the samples
   std::vector<std::string> left_out;
-  const size_t rays = context.timing_rays();
-  for (const auto& scene : context.scenes) {
-    const RaySet set = scene->diffuse(rays, true);
-    double vulkan_exact = 0;  // seconds on a BVH: a device holds one scene at a time
-    for (const Bake& how : bakes(context)) {
-      const Baked& baked = scene->bake(how);
-      if (!baked.available) {
-        left_out.push_back(scene->name() + " " + how.name + " (" + baked.reason + ")");
-        continue;
-      }
-      context.progress("pareto: " + scene->name() + " " + how.name);
-      const OpenFile file(baked.path);
-      if (!file.has_line_spaces() || !file.has_exact_tree()) continue;
-      std::vector<Mode> modes = {{}};
-      for (const Mode& mode : modes_for(file, context.quick)) modes.push_back(mode);
-      const auto tracer = cpu_tracer(file, context.threads);
-      std::unique_ptr<OpenFile> bvh_file;
-      std::unique_ptr<Tracer> bvh;
-      if (is_ntree(file)) {
-        bvh_file = std::make_unique<OpenFile>(scene->base().path);
-        bvh = cpu_tracer(*bvh_file, context.threads);
-      }
-      std::vector<std::vector<LspHit>> hits(modes.size(), std::vector<LspHit>(set.rays.size()));
-      std::vector<Contender> contenders;
-      for (size_t m = 0; m < modes.size(); ++m) {
-        contenders.push_back({modes[m].name(), [&, m] {
-                                return (m == 0 && bvh ? *bvh : *tracer).trace(modes[m], set.rays, hits[m]);
-                              }});
-      }
-      const std::vector<Timing> timings = race(contenders, 1, 3);
-      std::vector<Timing> on_vulkan;
-      const std::unique_ptr<Tracer> vulkan = context.vulkan_tracer(file, scene->name() + ", " + how.name);
-      if (vulkan) {
-        // A quarter of the rays: a software device takes its time, and the ratio is all that is wanted.
-        const std::span<const LspRay> some = std::span(set.rays).first(set.rays.size() / 4);
-        std::vector<LspHit> out(some.size());
-        std::vector<Contender> others;
-        for (const Mode& mode : modes)
-          others.push_back({mode.name(), [&, mode] { return vulkan->trace(mode, some, out); }});
-        on_vulkan = race(others, 1, 3);
-        if (!is_ntree(file)) vulkan_exact = on_vulkan[0].median;
-      }
-      for (size_t m = 1; m < modes.size(); ++m) {
-        const RayErrors errors = ray_errors(scene->soup(), set.rays, set.truth, hits[m]);
-        const Work work =
-            count_work(file, modes[m], std::span(set.rays).first(std::min<size_t>(set.rays.size(), 20000)));
-        Sample sample{scene->name(),
-                      how.name,
-                      modes[m].name(),
-                      timings[0].median / timings[m].median,
-                      on_vulkan.empty() ? 0 : vulkan_exact / on_vulkan[m].median,
-                      100 * errors.wrong_share(),
-                      100 * errors.depth_diagonal.mean,
-                      static_cast<double>(baked.file_bytes) * 1e-6};
-        Json row;
-        row["scene"] = sample.scene;
-        row["bake"] = sample.bake;
-        row["mode"] = sample.mode;
-        row["times"] = sample.times;
-        if (sample.times_vulkan > 0) row["times_vulkan"] = sample.times_vulkan;
-        row["mrays"] = mega(set.rays.size(), timings[m]);
-        row["spread"] = 100 * timings[m].spread;
-        row["file_mb"] = sample.megabytes;
-        row["bake_seconds"] = baked.seconds;
-        add_errors(row, errors);
-        row["nodes"] = work.nodes;
-        row["shafts"] = work.shafts;
-        row["triangle_tests"] = work.triangles;
-        samples.push_back(sample);
-        rows.push_back(row);
-      }
+  size_t uncertain = 0;  // ratios that their spread makes meaningless
+};
+
+void sweep_scene(Context& context, SceneUnderTest& scene, Sweep& sweep) {
+  const RaySet set = scene.diffuse(context.timing_rays(), true);
+  context.answers.peers[scene.name()] = measure_peers(context, scene, set);
+  double vulkan_exact = 0;  // seconds on a BVH: a device holds one scene at a time
+  for (const Bake& how : bakes(context)) {
+    const Baked& baked = scene.bake(how);
+    if (!baked.available) {
+      sweep.left_out.push_back(scene.name() + " " + how.name + " (" + baked.reason + ")");
+      continue;
+    }
+    context.progress("pareto: " + scene.name() + " " + how.name);
+    const OpenFile file(baked.path);
+    if (!file.has_line_spaces() || !file.has_exact_tree()) continue;
+    std::vector<Mode> modes = {{}};
+    for (const Mode& mode : modes_for(file, context.quick)) modes.push_back(mode);
+    const auto tracer = cpu_tracer(file, context.threads);
+    std::unique_ptr<OpenFile> bvh_file;
+    std::unique_ptr<Tracer> bvh;
+    if (is_ntree(file)) {
+      bvh_file = std::make_unique<OpenFile>(scene.base().path);
+      bvh = cpu_tracer(*bvh_file, context.threads);
+    }
+    std::vector<std::vector<LspHit>> hits(modes.size(), std::vector<LspHit>(set.rays.size()));
+    std::vector<Contender> contenders;
+    for (size_t m = 0; m < modes.size(); ++m) {
+      contenders.push_back({modes[m].name(), [&, m] {
+                              return (m == 0 && bvh ? *bvh : *tracer).trace(modes[m], set.rays, hits[m]);
+                            }});
+    }
+    const std::vector<Timing> timings = race(contenders, 1, 3);
+    std::vector<Timing> on_vulkan;
+    const std::string what = scene.name() + ", " + how.name;
+    if (const std::unique_ptr<Tracer> vulkan = context.vulkan_tracer(file, what)) {
+      // A quarter of the rays: a software device takes its time, and the ratio is all that is wanted.
+      on_vulkan =
+          context.race_on_vulkan(*vulkan, modes, std::span(set.rays).first(set.rays.size() / 4), 3, what);
+      if (!on_vulkan.empty() && !is_ntree(file)) vulkan_exact = on_vulkan[0].median;
+    }
+    for (size_t m = 1; m < modes.size(); ++m) {
+      const RayErrors errors = ray_errors(scene.soup(), set.rays, set.truth, hits[m]);
+      const Work work =
+          count_work(file, modes[m], std::span(set.rays).first(std::min<size_t>(set.rays.size(), 20000)));
+      const Sample sample{scene.name(),
+                          how.name,
+                          modes[m].name(),
+                          timings[0].median / timings[m].median,
+                          on_vulkan.empty() ? 0 : vulkan_exact / on_vulkan[m].median,
+                          100 * errors.wrong_share(),
+                          100 * errors.depth_diagonal.mean,
+                          static_cast<double>(baked.file_bytes) * 1e-6};
+      sweep.uncertain += ratio_is_meaningless(timings[m], timings[0]);
+      Json row;
+      row["scene"] = sample.scene;
+      row["bake"] = sample.bake;
+      row["mode"] = sample.mode;
+      row["times"] = sample.times;
+      if (sample.times_vulkan > 0) row["times_vulkan"] = sample.times_vulkan;
+      row["mrays"] = mega(set.rays.size(), timings[m]);
+      row["spread"] = 100 * timings[m].spread;
+      row["file_mb"] = sample.megabytes;
+      row["bake_seconds"] = baked.seconds;
+      add_errors(row, errors);
+      row["nodes"] = work.nodes;
+      row["shafts"] = work.shafts;
+      row["triangle_tests"] = work.triangles;
+      sweep.samples.push_back(sample);
+      sweep.rows.push_back(row);
     }
   }
-  const std::vector<bool> best_wrong = frontier(samples, &Sample::wrong_percent);
-  const std::vector<bool> best_depth = frontier(samples, &Sample::depth_percent);
-  for (size_t i = 0; i < rows.size(); ++i) {
-    rows[i]["frontier"] = best_wrong[i] && best_depth[i] ? "both"
-                          : best_wrong[i]                ? "wrong"
-                          : best_depth[i]                ? "depth"
-                                                         : "";
-  }
-  Table table{"pareto", "All combinations", "", {}, rows};
-  table.columns = {{"scene", "scene"},         {"bake", "bake"},
-                   {"mode", "mode"},           {"frontier", "frontier"},
-                   {"times", "x exact"},       {"times_vulkan", "x exact, Vulkan"},
-                   {"mrays", "Mrays/s"},       {"spread", "spread, %", 1},
-                   {"file_mb", "file, MB", 1}, {"bake_seconds", "bake, s", 1}};
-  for (const Column& column : error_columns()) table.columns.push_back(column);
-  for (const Column& column : {Column{"nodes", "nodes a ray", 1}, Column{"shafts", "look-ups a ray", 1},
-                               Column{"triangle_tests", "triangles a ray", 1}}) {
-    table.columns.push_back(column);
-  }
+}
 
+std::vector<Plot> plots_of(const Context& context, const std::vector<Sample>& samples,
+                           const std::vector<bool>& best) {
   Plot speed{"pareto_wrong",
              "Speed against wrong answers",
              "Up and left is better.",
@@ -256,7 +202,7 @@ Section pareto_suite(Context& context) {
              {"file, MB", true}, {"wrong answers, % of rays", true}, {}};
   Plot curve{"pareto_frontier",
              "The frontier of each scene",
-             "",
+             "What nothing else of the scene beats in both.",
              {"wrong answers, % of rays", true},
              {"times the exact trace", false},
              {}};
@@ -269,7 +215,7 @@ Section pareto_suite(Context& context) {
       s.points.push_back({std::max(sample.wrong_percent, 1e-3), sample.times, label});
       d.points.push_back({std::max(sample.depth_percent, 1e-4), sample.times, label});
       b.points.push_back({sample.megabytes, std::max(sample.wrong_percent, 1e-3), label});
-      if (best_wrong[i]) f.points.push_back(s.points.back());
+      if (best[i]) f.points.push_back(s.points.back());
     }
     std::sort(f.points.begin(), f.points.end(), [](const Point& a, const Point& c) { return a.x < c.x; });
     speed.series.push_back(s);
@@ -277,46 +223,68 @@ Section pareto_suite(Context& context) {
     bytes.series.push_back(b);
     curve.series.push_back(f);
   }
+  return {curve, speed, depth, bytes};
+}
 
-  Table limits{"pareto_limits",
-               "The fastest within a limit of wrong answers",
-               "\"exact\" where nothing approximate is faster within the limit.",
-               {{"limit", "wrong answers at most, %", 1},
-                {"scene", "scene"},
-                {"times", "x exact"},
-                {"bake", "bake"},
-                {"mode", "mode"},
-                {"wrong_percent", "wrong %", 3},
-                {"file_mb", "file, MB", 1}},
-               {}};
-  for (const double limit : {0.1, 0.5, 1.0, 2.0}) {
-    const std::map<std::string, Sample> best = best_within(samples, limit, &Sample::times);
-    for (const auto& [name, sample] : best) {
-      Json row;
-      row["limit"] = limit;
-      row["scene"] = name;
-      row["times"] = sample.times;
-      row["bake"] = sample.bake;
-      row["mode"] = sample.mode;
-      row["wrong_percent"] = sample.wrong_percent;
-      if (sample.megabytes > 0) row["file_mb"] = sample.megabytes;
-      limits.rows.push_back(row);
-    }
+}  // namespace
+
+Section pareto_suite(Context& context) {
+  Section section{"pareto", "Run time against error", {}, {}, {}, {}};
+  section.paragraphs.push_back(
+      "Every bake, traced in every way, on shuffled diffuse rays from what a camera sees, all threads. Speed "
+      "is "
+      "times the exact trace of the BVH in the same run, for NTrees too; wrong answers are rays that hit "
+      "where "
+      "truth misses or the reverse. On the frontier nothing else is both faster and less often wrong.");
+  Sweep sweep;
+  context.each_scene(section, [&](SceneUnderTest& scene) { sweep_scene(context, scene, sweep); });
+  const std::vector<bool> best_wrong = frontier(sweep.samples, &Sample::wrong_percent);
+  const std::vector<bool> best_depth = frontier(sweep.samples, &Sample::depth_percent);
+  for (size_t i = 0; i < sweep.rows.size(); ++i) {
+    sweep.rows[i]["frontier"] = best_wrong[i] && best_depth[i] ? "both"
+                                : best_wrong[i]                ? "wrong"
+                                : best_depth[i]                ? "depth"
+                                                               : "";
   }
-  if (!samples.empty()) {
-    answer(context, samples, &Sample::times, "On the CPU (" + std::to_string(context.threads) + " threads)");
-    const bool everywhere = std::all_of(samples.begin(), samples.end(),
-                                        [](const Sample& sample) { return sample.times_vulkan > 0; });
-    if (everywhere)
-      answer(context, samples, &Sample::times_vulkan, "On Vulkan (" + context.vulkan->device_name() + ")");
+  Table table{"pareto", "All combinations", "", {}, sweep.rows};
+  table.columns = {{"scene", "scene"},         {"bake", "bake"},
+                   {"mode", "mode"},           {"frontier", "frontier"},
+                   {"times", "x exact"},       {"times_vulkan", "x exact, Vulkan"},
+                   {"mrays", "Mrays/s"},       {"spread", "spread, %", 1},
+                   {"file_mb", "file, MB", 1}, {"bake_seconds", "bake, s", 1}};
+  for (const Column& column : error_columns()) table.columns.push_back(column);
+  for (const Column& column : {Column{"nodes", "nodes a ray", 1}, Column{"shafts", "look-ups a ray", 1},
+                               Column{"triangle_tests", "triangles a ray", 1}}) {
+    table.columns.push_back(column);
   }
-  if (!left_out.empty()) {
+  Table peers{"pareto_peers",
+              "Exact tracers on the same rays, times our exact trace",
+              "",
+              {{"scene", "scene"},
+               {"embree", "Embree rtcIntersect1, robust"},
+               {"wide", "our tree, eight children a node"},
+               {"exact_mb", "file without Line Spaces, MB", 1}},
+              {}};
+  for (const auto& [scene, peer] : context.answers.peers) {
+    Json row{{"scene", scene}};
+    if (peer.embree > 0) row["embree"] = peer.embree;
+    if (peer.wide > 0) row["wide"] = peer.wide;
+    if (peer.exact_megabytes > 0) row["exact_mb"] = peer.exact_megabytes;
+    peers.rows.push_back(row);
+  }
+  if (sweep.uncertain > 0) {
+    context.warnings.push_back("pareto: of " + std::to_string(sweep.samples.size()) + " ratios " +
+                               std::to_string(sweep.uncertain) +
+                               " cannot be told from 1x by the spread of their repeats.");
+  }
+  if (!sweep.left_out.empty()) {
     std::string text = "Left out: ";
-    for (size_t i = 0; i < left_out.size(); ++i) text += (i ? "; " : "") + left_out[i];
+    for (size_t i = 0; i < sweep.left_out.size(); ++i) text += (i ? "; " : "") + sweep.left_out[i];
     section.paragraphs.push_back(text + ".");
   }
-  section.plots = {curve, speed, depth, bytes};
-  section.tables = {std::move(limits), std::move(table)};
+  section.plots = plots_of(context, sweep.samples, best_wrong);
+  context.answers.samples = std::move(sweep.samples);
+  section.tables = {std::move(peers), std::move(table)};
   return section;
 }
 

@@ -40,42 +40,44 @@ Section scaling_suite(Context& context) {
   std::vector<std::vector<double>> grown(5);
   for (const uint64_t size : sizes) {
     context.progress("scaling: " + std::to_string(size));
-    std::filesystem::create_directories(context.cache);
-    const auto input = context.cache / ("room-" + std::to_string(size) + ".ply");
-    write_ply(input, room_of_spheres(size));
-    SceneUnderTest scene(input, context.cache, line_space_bake(4, 9));
-    const Baked& baked = scene.base();
-    const OpenFile file(baked.path);
-    const RaySet set = scene.diffuse(context.timing_rays() / 2, true);
-    const auto ours = cpu_tracer(file, context.threads);
-    const auto embree = embree_tracer(scene.reference(), EmbreeCall::kSingle, "", context.threads);
-    std::vector<LspHit> exact(set.rays.size()), approximate = exact, other = exact;
-    const std::vector<Timing> timings =
-        race({{"exact", [&] { return ours->trace({}, set.rays, exact); }},
-              {"approximate", [&] { return ours->trace({.approximate = true}, set.rays, approximate); }},
-              {"Embree", [&] { return embree->trace({}, set.rays, other); }}},
-             1, std::max(3, context.repeats() - 2));
-    const RayErrors errors = ray_errors(scene.soup(), set.rays, set.truth, approximate);
-    const Work work =
-        count_work(file, {}, std::span(set.rays).first(std::min<size_t>(set.rays.size(), 20000)));
-    Json row;
-    row["triangles"] = scene.soup().size();
-    row["bake_seconds"] = baked.seconds;
-    row["peak_mib"] = static_cast<double>(baked.peak_bytes) / (1 << 20);
-    row["file_mb"] = static_cast<double>(baked.file_bytes) * 1e-6;
-    row["exact_mrays"] = mega(set.rays.size(), timings[0]);
-    row["approximate_mrays"] = mega(set.rays.size(), timings[1]);
-    row["times"] = context.speed_up("scaling, " + std::to_string(size), timings[1], timings[0]);
-    row["embree_mrays"] = mega(set.rays.size(), timings[2]);
-    add_errors(row, errors);
-    row["nodes"] = work.nodes;
-    table.rows.push_back(row);
-    triangles.push_back(static_cast<double>(scene.soup().size()));
-    const double measured[] = {baked.seconds, static_cast<double>(baked.peak_bytes),
-                               static_cast<double>(baked.file_bytes), timings[0].median, timings[1].median};
-    for (size_t k = 0; k < 5; ++k) grown[k].push_back(measured[k]);
-    std::filesystem::remove(input);
-    if (size > 1000000) std::filesystem::remove(baked.path);  // a gigabyte that nobody needs again
+    context.guarded(section, std::to_string(size) + " triangles", [&] {
+      std::filesystem::create_directories(context.cache);
+      const auto input = context.cache / ("room-" + std::to_string(size) + ".ply");
+      write_ply(input, room_of_spheres(size));
+      SceneUnderTest scene(input, context.cache, line_space_bake(4, 9));
+      const Baked& baked = scene.base();
+      const OpenFile file(baked.path);
+      const RaySet set = scene.diffuse(context.timing_rays() / 2, true);
+      const auto ours = cpu_tracer(file, context.threads);
+      const auto embree = embree_tracer(scene.reference(), EmbreeCall::kSingle, "", context.threads);
+      std::vector<LspHit> exact(set.rays.size()), approximate = exact, other = exact;
+      const std::vector<Timing> timings =
+          race({{"exact", [&] { return ours->trace({}, set.rays, exact); }},
+                {"approximate", [&] { return ours->trace({.approximate = true}, set.rays, approximate); }},
+                {"Embree", [&] { return embree->trace({}, set.rays, other); }}},
+               1, std::max(3, context.repeats() - 2));
+      const RayErrors errors = ray_errors(scene.soup(), set.rays, set.truth, approximate);
+      const Work work =
+          count_work(file, {}, std::span(set.rays).first(std::min<size_t>(set.rays.size(), 20000)));
+      Json row;
+      row["triangles"] = scene.soup().size();
+      row["bake_seconds"] = baked.seconds;
+      row["peak_mib"] = static_cast<double>(baked.peak_bytes) / (1 << 20);
+      row["file_mb"] = static_cast<double>(baked.file_bytes) * 1e-6;
+      row["exact_mrays"] = mega(set.rays.size(), timings[0]);
+      row["approximate_mrays"] = mega(set.rays.size(), timings[1]);
+      row["times"] = context.speed_up("scaling, " + std::to_string(size), timings[1], timings[0]);
+      row["embree_mrays"] = mega(set.rays.size(), timings[2]);
+      add_errors(row, errors);
+      row["nodes"] = work.nodes;
+      table.rows.push_back(row);
+      triangles.push_back(static_cast<double>(scene.soup().size()));
+      const double measured[] = {baked.seconds, static_cast<double>(baked.peak_bytes),
+                                 static_cast<double>(baked.file_bytes), timings[0].median, timings[1].median};
+      for (size_t k = 0; k < 5; ++k) grown[k].push_back(measured[k]);
+      std::filesystem::remove(input);
+      if (size > 1000000) std::filesystem::remove(baked.path);  // a gigabyte that nobody needs again
+    });
   }
   static constexpr const char* kNames[] = {"bake time", "bake's memory", "file size", "time of an exact ray",
                                            "time of an approximate ray"};

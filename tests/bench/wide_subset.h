@@ -1,0 +1,12 @@
+// The library's own ray set-up, triangle depth and answer (lsp/traverse.h) for the wide tree, which differs
+// from the library in the traversal alone.
+#pragma once
+
+#include "trace_subset.h"
+
+namespace lsp::bench::wide {
+using namespace lsp::subset;
+#define LSP_COUNTS_PARAM
+#define LSP_COUNTS_ARG
+#include "lsp/traverse.h"
+}  // namespace lsp::bench::wide
