@@ -32,7 +32,8 @@ void Context::guarded(Section& section, const std::string& what, const std::func
     return;
   } catch (const Failure& failure) {
     message = (failure.file().empty() ? "" : failure.file() + ": ") + failure.what();
-    if (!first_failure) first_failure = failure;
+    // A file that cannot do what is asked is no failure of the run.
+    if (!first_failure && failure.exit() != Exit::kUnsupported) first_failure = failure;
   } catch (const std::bad_alloc&) {
     message = "out of memory";
     if (!first_failure) first_failure = Failure(Exit::kLimit, what, message);

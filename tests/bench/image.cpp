@@ -45,7 +45,9 @@ Image read_pfm(const std::string& path) {
   return image;
 }
 
-std::string encode_png(const Image& image) {
+namespace {
+
+std::vector<uint8_t> bytes_of(const Image& image) {
   std::vector<uint8_t> bytes;
   bytes.reserve(image.pixels.size() * 3);
   for (const glm::vec3& pixel : image.pixels) {
@@ -54,13 +56,61 @@ std::string encode_png(const Image& image) {
       bytes.push_back(static_cast<uint8_t>(std::lround(value * 255.0f)));
     }
   }
+  return bytes;
+}
+
+void append(void* out, void* data, int size) {
+  static_cast<std::string*>(out)->append(static_cast<const char*>(data), static_cast<size_t>(size));
+}
+
+}  // namespace
+
+std::string encode_png(const Image& image) {
   std::string png;
-  const auto append = [](void* out, void* data, int size) {
-    static_cast<std::string*>(out)->append(static_cast<const char*>(data), static_cast<size_t>(size));
-  };
   stbi_write_png_to_func(append, &png, static_cast<int>(image.width), static_cast<int>(image.height), 3,
-                         bytes.data(), static_cast<int>(image.width * 3));
+                         bytes_of(image).data(), static_cast<int>(image.width * 3));
   return png;
+}
+
+std::string encode_jpeg(const Image& image, int quality) {
+  std::string jpeg;
+  stbi_write_jpg_to_func(append, &jpeg, static_cast<int>(image.width), static_cast<int>(image.height), 3,
+                         bytes_of(image).data(), quality);
+  return jpeg;
+}
+
+Image crop(const Image& image, uint32_t x, uint32_t y, uint32_t width, uint32_t height) {
+  Image part(width, height);
+  for (uint32_t j = 0; j < height; ++j) {
+    for (uint32_t i = 0; i < width; ++i) part.at(i, j) = image.at(x + i, y + j);
+  }
+  return part;
+}
+
+void draw_frame(Image& image, uint32_t x, uint32_t y, uint32_t width, uint32_t height, glm::vec3 colour) {
+  constexpr uint32_t kWide = 2;
+  const uint32_t x0 = x - std::min(x, kWide), y0 = y - std::min(y, kWide);
+  const uint32_t x1 = std::min(x + width + kWide, image.width),
+                 y1 = std::min(y + height + kWide, image.height);
+  for (uint32_t j = y0; j < y1; ++j) {
+    for (uint32_t i = x0; i < x1; ++i) {
+      const bool inside = i >= x && i < x + width && j >= y && j < y + height;
+      if (!inside) image.at(i, j) = colour;
+    }
+  }
+}
+
+glm::vec3 heat_colour(float x) {
+  // Five stops of the "inferno" map of matplotlib.
+  constexpr size_t kStops = 5;
+  static const glm::vec3 stops[kStops] = {{0.0f, 0.0f, 0.02f},
+                                          {0.34f, 0.06f, 0.43f},
+                                          {0.74f, 0.22f, 0.33f},
+                                          {0.98f, 0.56f, 0.04f},
+                                          {0.99f, 1.0f, 0.64f}};
+  const float at = std::clamp(x, 0.0f, 1.0f) * (kStops - 1);
+  const auto below = std::min(static_cast<size_t>(at), kStops - 2);
+  return glm::mix(stops[below], stops[below + 1], at - static_cast<float>(below));
 }
 
 Image to_display(const Image& linear, float exposure) {

@@ -25,6 +25,17 @@ Image read_pfm(const std::string& path);
 // 8-bit PNG in memory; `image` holds display values in [0, 1] already.
 std::string encode_png(const Image& image);
 
+std::string encode_jpeg(const Image& image, int quality = 88);
+
+// The part of `image` that begins at x, y; it must lie inside.
+Image crop(const Image& image, uint32_t x, uint32_t y, uint32_t width, uint32_t height);
+
+// A frame two pixels wide around that part, drawn into `image`.
+void draw_frame(Image& image, uint32_t x, uint32_t y, uint32_t width, uint32_t height, glm::vec3 colour);
+
+// A heat map's colour for x in [0, 1], in display values: black, violet, red, orange, yellow.
+glm::vec3 heat_colour(float x);
+
 // Linear to sRGB, clamped to [0, 1].
 Image to_display(const Image& linear, float exposure = 1);
 

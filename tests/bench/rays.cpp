@@ -45,6 +45,29 @@ LspRay ray(const glm::dvec3& origin, const glm::dvec3& direction, double tmax) {
   return {to_float3(origin), 0.0f, to_float3(direction), static_cast<float>(tmax)};
 }
 
+// Does a viewer there stand in a room? Surfaces in two thirds of all directions, and a quarter of them at
+// least with their front: a closed object seen from within shows none, a room of careless winding some.
+bool encloses(const Soup& soup, const TraceFunction& trace, const glm::dvec3& eye) {
+  Random random(11);
+  std::vector<LspRay> rays;
+  while (rays.size() < 128) {
+    const glm::dvec3 p(2 * random.uniform() - 1, 2 * random.uniform() - 1, 2 * random.uniform() - 1);
+    const double square = glm::dot(p, p);
+    if (square < 1 && square > 1e-6) rays.push_back(ray(eye, p, INFINITY));
+  }
+  std::vector<LspHit> hits(rays.size());
+  trace(rays, hits);
+  size_t seen = 0, fronts = 0;
+  for (size_t i = 0; i < rays.size(); ++i) {
+    if (hits[i].primitive == LSP_NONE) continue;
+    ++seen;
+    const glm::dvec3 normal = geometric_normal(soup.corners[soup.triangle_of[hits[i].primitive]]);
+    const lsp_float3& d = rays[i].direction;
+    fronts += glm::dot(normal, glm::dvec3(d.x, d.y, d.z)) < 0;
+  }
+  return 3 * seen >= 2 * rays.size() && 4 * fronts >= seen;
+}
+
 }  // namespace
 
 std::vector<SurfacePoint> area_points(const Soup& soup, size_t count, Random& random) {
@@ -157,9 +180,11 @@ Camera choose_camera(const Soup& soup, const TraceFunction& trace, uint32_t widt
     const std::vector<LspRay> rays = camera_rays(camera, random);
     std::vector<LspHit> hits(rays.size());
     trace(rays, hits);
+    if (!encloses(soup, trace, camera.eye)) continue;
     std::vector<double> distances;
-    for (const LspHit& hit : hits) {
-      if (hit.primitive != LSP_NONE) distances.push_back(hit.t);
+    for (size_t i = 0; i < rays.size(); ++i) {
+      if (hits[i].primitive == LSP_NONE) continue;
+      distances.push_back(hits[i].t);
     }
     if (distances.size() < rays.size() * 97 / 100) continue;
     std::sort(distances.begin(), distances.end());

@@ -53,8 +53,8 @@ std::vector<LspRay> shadow_rays(const Soup& soup, std::span<const SurfacePoint> 
 // origin kOriginOffset above it, shuffled. The same for the same soup, count and seed.
 std::vector<LspRay> surface_rays(const Soup& soup, size_t count, uint64_t seed);
 
-// A camera that sees the scene well without anyone saying where: inside where the scene encloses a viewer,
-// else in front of it. Deterministic.
+// A camera that sees the scene well without anyone saying where: inside where the scene encloses a viewer as
+// a room does, else in front of it; never within an object. Deterministic.
 Camera choose_camera(const Soup& soup, const TraceFunction& trace, uint32_t width, uint32_t height);
 
 }  // namespace lsp::bench

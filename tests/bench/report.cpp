@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "escape.h"
+#include "image.h"
 #include "lsp/program.h"
 #include "output_file.h"
 
@@ -23,7 +24,8 @@ td.word,th.word{text-align:left}tr:nth-child(even) td{background:linear-gradient
 .answers{padding:.5rem 1rem .5rem 2rem;border-left:4px solid #009E73;background:var(--soft)}
 .warnings{padding:.5rem 1rem .5rem 2rem;border-left:4px solid #D55E00;background:var(--soft)}
 dl{display:grid;grid-template-columns:max-content 1fr;gap:.1rem 1rem;font-size:.875rem}dt{opacity:.7}dd{margin:0;overflow-wrap:anywhere}
-.pictures{display:grid;grid-template-columns:repeat(auto-fit,minmax(15rem,1fr));gap:.5rem}.pictures figure{margin:0}
+.pictures{display:grid;gap:.4rem}.pictures figure{margin:0}.pictures figcaption{font-size:.75rem;line-height:1.3}
+.legend{display:flex;align-items:center;gap:.5rem;font-size:.75rem}.legend i{flex:0 1 12rem;height:.8rem;display:block}
 nav a{margin-right:1rem}
 )";
 
@@ -73,6 +75,33 @@ std::string table_html(const Table& table) {
     html += "</tr>\n";
   }
   return html + "</tbody></table></div>\n";
+}
+
+std::string legend_html(const std::string& end) {
+  std::string gradient;
+  constexpr int kStops = 8;
+  for (int k = 0; k <= kStops; ++k) {
+    const glm::vec3 colour = 255.0f * heat_colour(static_cast<float>(k) / kStops);
+    char text[48];
+    std::snprintf(text, sizeof text, ",rgb(%d,%d,%d)", static_cast<int>(colour.r), static_cast<int>(colour.g),
+                  static_cast<int>(colour.b));
+    gradient += text;
+  }
+  return "<p class=legend>no difference <i style='background:linear-gradient(90deg" + gradient + ")'></i> " +
+         escape(end) + "</p>\n";
+}
+
+std::string grid_html(const PictureGrid& grid) {
+  std::string html = "<h3>" + escape(grid.title) + "</h3>\n";
+  if (!grid.caption.empty()) html += "<p class=caption>" + escape(grid.caption) + "</p>\n";
+  html += "<div class=scroll><div class=pictures style='grid-template-columns:repeat(" +
+          std::to_string(grid.columns) + ",minmax(10rem,1fr))'>\n";
+  for (const Picture& picture : grid.pictures) {
+    html += "<figure><img loading=lazy alt='" + escape(picture.caption) + "' src='data:image/" +
+            (picture.jpeg ? "jpeg" : "png") + ";base64," + base64(picture.bytes) + "'><figcaption>" +
+            escape(picture.caption) + "</figcaption></figure>\n";
+  }
+  return html + "</div></div>\n" + (grid.legend.empty() ? "" : legend_html(grid.legend));
 }
 
 std::string list_html(const char* name, const std::vector<std::string>& items) {
@@ -167,14 +196,7 @@ std::string to_html(const Report& report) {
       if (!plot.caption.empty()) html += "<figcaption>" + escape(plot.caption) + "</figcaption>";
       html += "</figure>\n";
     }
-    if (!section.pictures.empty()) {
-      html += "<div class=pictures>\n";
-      for (const Picture& picture : section.pictures) {
-        html += "<figure><img alt='" + escape(picture.caption) + "' src='data:image/png;base64," +
-                base64(picture.png) + "'><figcaption>" + escape(picture.caption) + "</figcaption></figure>\n";
-      }
-      html += "</div>\n";
-    }
+    for (const PictureGrid& grid : section.pictures) html += grid_html(grid);
     for (const Table& table : section.tables) html += table_html(table);
   }
   html += "<h2 id=facts>Measured on</h2>\n<dl>\n";
@@ -192,8 +214,10 @@ void write_report(const Report& report, const std::filesystem::path& directory) 
   for (const Section& section : report.sections) {
     for (const Table& table : section.tables) write_file(directory / (table.id + ".csv"), to_csv(table));
     for (const Plot& plot : section.plots) write_file(directory / (plot.id + ".svg"), to_svg(plot));
-    for (const Picture& picture : section.pictures)
-      write_file(directory / (picture.id + ".png"), picture.png);
+    for (const PictureGrid& grid : section.pictures) {
+      for (const Picture& picture : grid.pictures)
+        write_file(directory / (picture.id + (picture.jpeg ? ".jpg" : ".png")), picture.bytes);
+    }
   }
   write_file(directory / "report.json", to_json(report).dump(1) + "\n");
   write_file(directory / "report.html", to_html(report));

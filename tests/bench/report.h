@@ -52,7 +52,17 @@ struct Plot {
 struct Picture {
   std::string id;
   std::string caption;
-  std::string png;  // the file's bytes
+  std::string bytes;  // of the file
+  bool jpeg = false;  // else PNG
+};
+
+// Pictures side by side, row by row.
+struct PictureGrid {
+  std::string title;
+  std::string caption;
+  size_t columns = 1;
+  std::vector<Picture> pictures;
+  std::string legend;  // what the right end of the heat maps' scale means; empty: there are no heat maps
 };
 
 struct Section {
@@ -60,7 +70,7 @@ struct Section {
   std::string title;
   std::vector<std::string> paragraphs;
   std::vector<Plot> plots;
-  std::vector<Picture> pictures;
+  std::vector<PictureGrid> pictures;
   std::vector<Table> tables;
 };
 
@@ -81,8 +91,8 @@ std::string to_html(const Report& report);
 
 std::string base64(const std::string& bytes);
 
-// Writes report.html, report.json, one .csv per table, one .svg per plot and one .png per picture into
-// `directory`, which it makes. Each file is written aside and renamed. Throws Failure(kFile).
+// Writes report.html, report.json, one .csv per table, one .svg per plot and one .png or .jpg per picture
+// into `directory`, which it makes. Each file is written aside and renamed. Throws Failure(kFile).
 void write_report(const Report& report, const std::filesystem::path& directory);
 
 }  // namespace lsp::bench

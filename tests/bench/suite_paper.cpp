@@ -81,13 +81,13 @@ const std::vector<Mode> kModes = {{},
                                   {.approximate = true, .near_approximate = true}};
 
 // Every mode against exact on the same file, on one tracer.
-std::vector<Timing> race_modes(Tracer& tracer, std::span<const LspRay> rays) {
+std::vector<Timing> race_modes(const Context& context, Tracer& tracer, std::span<const LspRay> rays) {
   std::vector<LspHit> hits(rays.size());
   std::vector<Contender> contenders;
   for (const Mode& mode : kModes) {
     contenders.push_back({mode.name(), [&, mode] { return tracer.trace(mode, rays, hits); }});
   }
-  return race(contenders, 1, 3);
+  return race(contenders, 1, context.repeats());
 }
 
 // A thread alone and a software device get fewer rays: ratios are what is wanted, and minutes are short.
@@ -118,8 +118,8 @@ void add_structure(Context& context, SceneUnderTest& scene, const Structure& str
   std::vector<std::vector<Timing>> times;
   std::vector<std::vector<Timing>> vulkan_times;
   for (const RaySet& set : sets) {
-    times.push_back(race_modes(*one, some_of(set)));
-    times.push_back(race_modes(*all, set.rays));
+    times.push_back(race_modes(context, *one, some_of(set)));
+    times.push_back(race_modes(context, *all, set.rays));
     if (!vulkan) continue;
     std::vector<Timing> raced =
         context.race_on_vulkan(*vulkan, kModes, some_of(set), 3, scene.name() + ", " + structure.name);

@@ -142,7 +142,7 @@ void sweep_scene(Context& context, SceneUnderTest& scene, Sweep& sweep) {
                               return (m == 0 && bvh ? *bvh : *tracer).trace(modes[m], set.rays, hits[m]);
                             }});
     }
-    const std::vector<Timing> timings = race(contenders, 1, 3);
+    const std::vector<Timing> timings = race(contenders, 1, context.repeats());
     std::vector<Timing> on_vulkan;
     const std::string what = scene.name() + ", " + how.name;
     if (const std::unique_ptr<Tracer> vulkan = context.vulkan_tracer(file, what)) {

@@ -121,7 +121,7 @@ Section peers_suite(Context& context) {
           contenders.push_back(
               {peers[i].name, [&, i] { return peers[i].tracer->trace(peers[i].mode, set.rays, hits[i]); }});
         }
-        const std::vector<Timing> timings = race(contenders, 1, 3);
+        const std::vector<Timing> timings = race(contenders, 1, context.repeats());
         for (size_t i = 0; i < peers.size(); ++i) {
           const RayErrors errors = set.any ? occlusion_errors(set.truth, hits[i])
                                            : ray_errors(scene->soup(), set.rays, set.truth, hits[i]);

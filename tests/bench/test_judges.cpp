@@ -125,10 +125,13 @@ TEST(Rays, ShadowRaysEndAtTheLight) {
 }
 
 TEST(Camera, LooksFromInsideARoomAndFromOutsideAtAnObject) {
-  Soup room = sphere(16, 24, glm::vec3(0), 5);
-  Soup object = soup_from({{glm::vec3(0), glm::vec3(1, 0, 0), glm::vec3(0, 1, 0)},
-                           {glm::vec3(0, 0, 1), glm::vec3(1, 0, 1), glm::vec3(0, 1, 1)}});
-  for (const Soup* soup : {&room, &object}) {
+  const Soup ball = sphere(16, 24, glm::vec3(0), 5);
+  Soup turned = ball;
+  for (auto& corners : turned.corners) std::swap(corners[1], corners[2]);
+  const Soup room = turned;
+  const Soup object = soup_from({{glm::vec3(0), glm::vec3(1, 0, 0), glm::vec3(0, 1, 0)},
+                                 {glm::vec3(0, 0, 1), glm::vec3(1, 0, 1), glm::vec3(0, 1, 1)}});
+  for (const Soup* soup : {&room, &object, &ball}) {
     const EmbreeScene embree(*soup, EmbreeMode::kRobust, 1);
     const Camera camera = choose_camera(
         *soup, [&](auto rays, auto hits) { embree.closest(rays, hits); }, 32, 32);
@@ -139,7 +142,7 @@ TEST(Camera, LooksFromInsideARoomAndFromOutsideAtAnObject) {
     const auto rays = camera_rays(camera, random);
     std::vector<LspHit> hits(rays.size());
     embree.closest(rays, hits);
-    EXPECT_GT(visible_points(*soup, rays, hits).size(), soup == &room ? 1000u : 20u);
+    EXPECT_GT(visible_points(*soup, rays, hits).size(), soup == &object ? 20u : 200u);
     for (const SurfacePoint& point : visible_points(*soup, rays, hits)) {
       EXPECT_GT(glm::dot(point.normal, camera.eye - point.position), 0);
     }

@@ -72,6 +72,29 @@ TEST(Image, PfmAndPng) {
   EXPECT_THROW(read_pfm(path), Failure);
   std::filesystem::remove(path);
   EXPECT_EQ(encode_png(pattern(false)).substr(1, 3), "PNG");
+  EXPECT_EQ(encode_jpeg(pattern(false)).substr(0, 2), "\xff\xd8");
+}
+
+TEST(Image, DetailsAndHeat) {
+  Image image = pattern(false);
+  const Image part = crop(image, 10, 20, 8, 6);
+  EXPECT_EQ(part.at(0, 0), image.at(10, 20));
+  EXPECT_EQ(part.at(7, 5), image.at(17, 25));
+  const glm::vec3 red(1, 0, 0);
+  draw_frame(image, 10, 20, 8, 6, red);
+  EXPECT_EQ(image.at(9, 19), red);
+  EXPECT_EQ(image.at(19, 27), red);
+  EXPECT_EQ(image.at(10, 20), part.at(0, 0));
+  EXPECT_EQ(image.at(7, 20), pattern(false).at(7, 20));
+  draw_frame(image, 0, 0, 48, 40, red);  // has no room, draws nothing
+  EXPECT_EQ(image.at(0, 0), pattern(false).at(0, 0));
+  float last = -1;
+  for (int k = 0; k <= 100; ++k) {  // brighter all the way
+    const glm::vec3 colour = heat_colour(static_cast<float>(k) / 100);
+    const float luma = glm::dot(colour, glm::vec3(0.2126f, 0.7152f, 0.0722f));
+    EXPECT_GT(luma, last);
+    last = luma;
+  }
 }
 
 Soup quad() {

@@ -30,7 +30,12 @@ Report sample() {
        {"x", true},
        {"y", false},
        {{"first", {{0.1, 1, "p"}, {10, 2, ""}}, true}, {"second", {{0, NAN, ""}}, false}}});
-  section.pictures.push_back({"dot", "A dot", std::string("\x89PNG\r\n", 6)});
+  section.pictures.push_back(
+      {"Dots",
+       "Two of them",
+       2,
+       {{"dot", "A dot", std::string("\x89PNG\r\n", 6)}, {"spot", "Another", "\xff\xd8", true}},
+       "a difference of 1"});
   report.sections.push_back(section);
   return report;
 }
@@ -60,6 +65,8 @@ TEST(Report, PageStandsAlone) {
   EXPECT_NE(html.find("1,234,567"), std::string::npos);
   EXPECT_NE(html.find("1.2e-07"), std::string::npos);
   EXPECT_NE(html.find("data:image/png;base64,iVBORw0K"), std::string::npos);
+  EXPECT_NE(html.find("data:image/jpeg;base64,/9g="), std::string::npos);
+  EXPECT_NE(html.find("linear-gradient(90deg,rgb(0,0,5)"), std::string::npos);
   EXPECT_NE(html.find("width=device-width"), std::string::npos);
   EXPECT_EQ(html.find("nan"), std::string::npos);
   // Nothing is fetched: the only addresses are namespaces.
@@ -72,7 +79,7 @@ TEST(Report, IsWrittenWhole) {
   const auto directory = std::filesystem::temp_directory_path() / "lsp_test_report";
   std::filesystem::remove_all(directory);
   write_report(sample(), directory);
-  for (const char* name : {"report.html", "report.json", "numbers.csv", "plot.svg", "dot.png"}) {
+  for (const char* name : {"report.html", "report.json", "numbers.csv", "plot.svg", "dot.png", "spot.jpg"}) {
     EXPECT_TRUE(std::filesystem::exists(directory / name)) << name;
   }
   std::filesystem::remove_all(directory);
