@@ -7,10 +7,12 @@
 #include <bit>
 #include <cmath>
 #include <glm/glm.hpp>
+#include <optional>
 
 #include "conservative.h"
 #include "lsp/lsp.h"
 #include "lsp/program.h"
+#include "shaft_raster.h"
 
 namespace lsp {
 namespace {
@@ -101,15 +103,17 @@ class Filler {
     const uint32_t shafts = (symmetric ? 15 : 30) * n * n * n * n;
     std::vector<uint32_t> hit(shafts, LSP_NONE);
     const uint32_t patches = n * n;
-    const std::vector<Sample> samples = shaft_samples(binary ? 1 : options_.samples);
-    const lsp_trace_options trace = {binary ? LSP_TRACE_ANY_HIT : 0u, 0.0f};
+    samples_ = shaft_samples(binary ? 1 : options_.samples);
+    raster_.emplace(lo_, hi_, n);
+    if (!gather(site_.subtree)) raster_.reset();
     for (uint32_t in = 0; in < 6; ++in)
       for (uint32_t out = symmetric ? in + 1 : 0; out < 6; ++out) {
         if (in == out) continue;
+        aim(out);
         for (uint32_t p = 0; p < patches; ++p) {
           const uint32_t base =
               symmetric ? LSP_SHAFT_INDEX_SYMMETRIC(in, out, p, 0u, n) : LSP_SHAFT_INDEX(in, out, p, 0u, n);
-          fill_row(in, p, out, samples, trace, &hit[base]);
+          fill_row(in, p, out, &hit[base]);
         }
       }
     return pack(hit);
@@ -152,65 +156,121 @@ class Filler {
       if (!in_cell || reaches_into(scene_.triangles[i], lo, hi)) shafts.add(scene_.triangles[i], i, either);
   }
 
-  // The shafts from one patch to all patches of one face. The first rays of a shaft often settle it: all
-  // miss, or one plane answers them all; only the other shafts are given the remaining samples.
-  void fill_row(uint32_t in, uint32_t p, uint32_t out, const std::vector<Sample>& samples,
-                const lsp_trace_options& trace, uint32_t* row) {
-    const uint32_t n = options_.resolution, patches = n * n;
-    const uint32_t all = uint32_t(samples.size()), first = std::min(all, kFirstSamples);
-    const auto ray = [&](uint32_t q, const Sample& s) -> LspRay {
-      const glm::vec3 a = patch_point(lo_, hi_, in, p, n, s.in_x, s.in_y);
-      const glm::vec3 b = patch_point(lo_, hi_, out, q, n, s.out_x, s.out_y);
-      return {f3(a), 0.0f, f3(b - a), 1.0f};
+  // The triangles that reach into the box, for the raster; false when they are too many for it.
+  bool gather(uint32_t child) {
+    const auto apart = [&](const lsp_float3& l, const lsp_float3& h) {
+      return l.x > hi_.x || l.y > hi_.y || l.z > hi_.z || h.x < lo_.x || h.y < lo_.y || h.z < lo_.z;
     };
-    rays_.resize(all);
-    hits_.resize(all);
-    for (uint32_t q = 0; q < patches; ++q) {
-      for (uint32_t i = 0; i < first; ++i) rays_[i] = ray(q, samples[i]);
-      trace_samples(trace, 0, first);
-      if (all == 1) {
-        row[q] = hits_[0].primitive;
-        continue;
-      }
-      float cost;
-      row[q] = choose(first, cost);
-      if (first == all || cost <= kSettled * float(first)) continue;
-      for (uint32_t i = first; i < all; ++i) rays_[i] = ray(q, samples[i]);
-      trace_samples(trace, first, all);
-      row[q] = choose(all, cost);
+    if (!(child & LSP_LEAF_BIT)) {
+      const LspNode& node = scene_.nodes[child];
+      return (apart(node.lo0, node.hi0) || gather(node.child0)) &&
+             (apart(node.lo1, node.hi1) || gather(node.child1));
+    }
+    const uint32_t first = child & LSP_LEAF_FIRST_MASK;
+    for (uint32_t i = first; i <= first + (child >> LSP_LEAF_COUNT_SHIFT & LSP_LEAF_COUNT_MASK); ++i) {
+      if (!reaches_into(scene_.triangles[i], glm::dvec3(lo_), glm::dvec3(hi_))) continue;
+      if (raster_->size() == ShaftRaster::max_triangles(options_.resolution)) return false;
+      raster_->add(scene_.triangles[i], i);
+    }
+    return true;
+  }
+
+  // Where the rays to the patches of a face end, by sample and patch.
+  void aim(uint32_t face) {
+    const uint32_t n = options_.resolution, patches = n * n;
+    ends_.resize(samples_.size() * patches);
+    for (size_t i = 0; i < samples_.size(); ++i)
+      for (uint32_t q = 0; q < patches; ++q)
+        ends_[i * patches + q] = patch_point(lo_, hi_, face, q, n, samples_[i].out_x, samples_[i].out_y);
+  }
+
+  // The rays of one sample from a patch to all patches of a face: what they hit, and where.
+  void cast(uint32_t sample, uint32_t face) {
+    const size_t patches = size_t(options_.resolution) * options_.resolution;
+    const std::span t = std::span(t_).subspan(sample * patches, patches);
+    const std::span records = std::span(records_).subspan(sample * patches, patches);
+    const std::span ends = std::span(ends_).subspan(sample * patches, patches);
+    const glm::vec3& a = origins_[sample];
+    if (raster_) {
+      raster_->cast(a, face, samples_[sample].out_x, samples_[sample].out_y, ends, t, records);
+      return;
+    }
+    rays_.resize(patches);
+    hits_.resize(patches);
+    for (uint32_t q = 0; q < patches; ++q) rays_[q] = {f3(a), 0.0f, f3(ends[q] - a), 1.0f};
+    const lsp_trace_options trace = {options_.kind == LineSpaceKind::kBinary ? LSP_TRACE_ANY_HIT : 0u, 0.0f};
+    if (lsp_trace(&scene_, &trace, rays_.data(), hits_.data(), patches, nullptr, nullptr) != LSP_OK)
+      throw Failure(Exit::kInternal, "", "the tracer refused the baker's own tree");
+    for (size_t q = 0; q < patches; ++q) {
+      t[q] = hits_[q].t;
+      records[q] = hits_[q].primitive;
     }
   }
 
-  void trace_samples(const lsp_trace_options& trace, uint32_t begin, uint32_t end) {
-    if (lsp_trace(&scene_, &trace, &rays_[begin], &hits_[begin], end - begin, nullptr, nullptr) != LSP_OK)
-      throw Failure(Exit::kInternal, "", "the tracer refused the baker's own tree");
+  // The shafts from one patch to all patches of one face. The first rays of a shaft often settle it: all
+  // miss, or one plane answers them all; only the others heed the remaining samples.
+  void fill_row(uint32_t in, uint32_t p, uint32_t out, uint32_t* row) {
+    const uint32_t patches = options_.resolution * options_.resolution;
+    const uint32_t all = uint32_t(samples_.size()), first = std::min(all, kFirstSamples);
+    origins_.clear();
+    for (const Sample& s : samples_)
+      origins_.push_back(patch_point(lo_, hi_, in, p, options_.resolution, s.in_x, s.in_y));
+    t_.resize(size_t(all) * patches);
+    records_.resize(size_t(all) * patches);
+    for (uint32_t i = 0; i < first; ++i) cast(i, out);
+    if (all == 1) {
+      std::copy_n(records_.begin(), patches, row);
+      return;
+    }
+    unsettled_.clear();
+    for (uint32_t q = 0; q < patches; ++q) {
+      float cost;
+      row[q] = choose(q, first, cost);
+      if (first < all && cost > kSettled * float(first)) unsettled_.push_back(q);
+    }
+    if (unsettled_.empty()) return;
+    for (uint32_t i = first; i < all; ++i) cast(i, out);
+    for (uint32_t q : unsettled_) {
+      float cost;
+      row[q] = choose(q, all, cost);
+    }
   }
 
   // The triangle among those hit, or none, whose plane answers the first `count` rays with the smallest sum
   // of errors: the distance along the ray where both hit, all of it where only one does.
-  uint32_t choose(uint32_t count, float& best_cost) const {
+  uint32_t choose(uint32_t q, uint32_t count, float& best_cost) const {
+    const size_t patches = size_t(options_.resolution) * options_.resolution;
+    const auto record = [&](uint32_t i) { return records_[i * patches + q]; };
+    bool alike = true;
     best_cost = 0;
-    for (uint32_t i = 0; i < count; ++i) best_cost += hits_[i].primitive != LSP_NONE ? 1.0f : 0.0f;
+    for (uint32_t i = 0; i < count; ++i) {
+      alike = alike && record(i) == record(0);
+      best_cost += record(i) != LSP_NONE ? 1.0f : 0.0f;
+    }
+    if (alike) {
+      best_cost = 0;
+      return record(0);
+    }
     uint32_t best = LSP_NONE;
-    if (best_cost == 0) return best;
     for (uint32_t c = 0; c < count; ++c) {
-      if (hits_[c].primitive == LSP_NONE) continue;
-      const LspTriangle& tri = scene_.triangles[hits_[c].primitive];
+      if (record(c) == LSP_NONE) continue;
+      const LspTriangle& tri = scene_.triangles[record(c)];
       const glm::vec3 v0 = vec(tri.v0);
       const glm::vec3 n = glm::cross(vec(tri.v1) - v0, vec(tri.v2) - v0);
       float cost = 0;
       for (uint32_t i = 0; i < count && cost < best_cost; ++i) {
-        const float t = glm::dot(v0 - vec(rays_[i].origin), n) / glm::dot(vec(rays_[i].direction), n);
+        const glm::vec3& a = origins_[i];
+        const float t = glm::dot(v0 - a, n) / glm::dot(ends_[i * patches + q] - a, n);
         const bool plane_hit = t >= 0 && t <= 1;
-        const bool hit = hits_[i].primitive != LSP_NONE;
+        const bool hit = record(i) != LSP_NONE;
         if (plane_hit && hit)
-          cost += std::fabs(t - hits_[i].t);
+          cost += std::fabs(t - t_[i * patches + q]);
         else if (plane_hit != hit)
           cost += 1;
       }
       if (cost < best_cost) {
         best_cost = cost;
-        best = hits_[c].primitive;
+        best = record(c);
       }
     }
     return best;
@@ -281,6 +341,14 @@ class Filler {
   lsp_scene scene_{};
   glm::vec3 lo_, hi_;
   double empty_margin_ = 0;
+  std::vector<Sample> samples_;
+  std::optional<ShaftRaster> raster_;  // none: too many triangles, the rays are traced
+  // The row being filled.
+  std::vector<glm::vec3> origins_;  // by sample
+  std::vector<glm::vec3> ends_;     // by sample and patch
+  std::vector<float> t_;            // by sample and patch
+  std::vector<uint32_t> records_;   // likewise
+  std::vector<uint32_t> unsettled_;
   std::vector<LspRay> rays_;
   std::vector<LspHit> hits_;
 };
