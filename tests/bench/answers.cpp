@@ -16,7 +16,8 @@ std::string number(const char* format, double value) {
   return text;
 }
 
-// "1.23x (1.00x dragon to 1.50x sponza)": geometric mean, least and greatest of `value` over the scenes.
+// "1.23x (1.00x dragon to 1.50x sponza)": geometric mean, least and greatest of `value` over the scenes; the
+// mean alone where they do not differ.
 std::string range_of(const Best& best, const std::function<double(const Sample&)>& value) {
   double log_sum = 0;
   std::pair<double, std::string> least{INFINITY, ""}, greatest{0, ""};
@@ -27,7 +28,7 @@ std::string range_of(const Best& best, const std::function<double(const Sample&)
     if (x > greatest.first) greatest = {x, scene};
   }
   const std::string mean = number("%.2fx", std::exp(log_sum / static_cast<double>(best.size())));
-  if (best.size() < 2) return mean;
+  if (best.size() < 2 || greatest.first - least.first < 0.005) return mean;
   return mean + number(" (%.2fx ", least.first) + least.second + number(" to %.2fx ", greatest.first) +
          greatest.second + ")";
 }

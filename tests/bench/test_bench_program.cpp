@@ -68,6 +68,33 @@ TEST_F(BenchProgram, WritesAReport) {
   }
 }
 
+TEST_F(BenchProgram, OneSceneThatFailsDoesNotEndTheRun) {
+  const fs::path good = directory_ / "room.ply", bad = directory_ / "bad.ply", out = directory_ / "out";
+  fs::create_directories(directory_ / "other");
+  const fs::path twin = directory_ / "other" / "room.ply";  // of the same name
+  write_ply(good, room_of_spheres(1000));
+  write_ply(twin, room_of_spheres(2000));
+  std::ofstream(bad) << "ply\nformat ascii 1.0\nelement vertex 99\nend_header\n";
+  const std::vector<std::string> command = {good.string(), bad.string(), twin.string(), "-o",
+                                            out.string(),  "--quick",    "--no-vulkan", "--suite",
+                                            "pareto",      "--json"};
+  const ProcessResult run = bench(command);
+  EXPECT_EQ(run.exit_code, 3) << run.errors;
+  EXPECT_NE(run.errors.find("bad.ply"), std::string::npos);
+  const Json json = Json::parse(run.output);
+  EXPECT_NE(json["warnings"].dump().find("bad.ply: left out"), std::string::npos);
+  const std::string rows = json["sections"]["pareto"]["tables"]["pareto"].dump();
+  EXPECT_NE(rows.find("\"room\""), std::string::npos);
+  EXPECT_NE(rows.find("\"room-2\""), std::string::npos);
+  EXPECT_TRUE(fs::exists(out / "report.html"));
+  EXPECT_EQ(json["warnings"].dump().find("earlier run"), std::string::npos);
+  EXPECT_GT(json["sections"]["cost"]["tables"]["costs"].size(), 1u);
+  // Once more: the bakes are there, and the report says so. Another input of that name is baked anew.
+  EXPECT_NE(bench(command).output.find("Of 2 bakes 2 are from an earlier run"), std::string::npos);
+  write_ply(good, room_of_spheres(1500));
+  EXPECT_NE(bench(command).output.find("Of 2 bakes 1 are from an earlier run"), std::string::npos);
+}
+
 TEST_F(BenchProgram, MeasuresAFileAsItIs) {
   const fs::path input = directory_ / "room.ply", baked = directory_ / "room.lsp", out = directory_ / "out";
   write_ply(input, room_of_spheres(1000));
