@@ -154,24 +154,29 @@ HWY_INLINE void traverse(const WideNode* nodes, const TriangleBlock* blocks, con
       HWY_ALIGN float t_in[kWideChildren];
       uint32_t hit = hit_children(node, frame, s.tmin, best.t, t_in);
       if (hit != 0) {
+        // The child to go on with, in a register: the nearest, for any hit the largest. Most nodes have one
+        // or two.
+        const auto first = hwy::Num0BitsBelowLS1Bit_Nonzero32(hit);
+        Entry next{t_in[first], node.child[first]};
         if (kAny) {
-          // From the smallest to the largest, which then lies on top.
-          while (hit != 0) {
-            const auto k = static_cast<uint32_t>(31 - hwy::Num0BitsAboveMS1Bit_Nonzero32(hit));
-            hit ^= 1u << k;
+          for (uint32_t rest = hit & (hit - 1); rest != 0;) {
+            const auto k = static_cast<uint32_t>(31 - hwy::Num0BitsAboveMS1Bit_Nonzero32(rest));
+            rest ^= 1u << k;
             stack[top++] = {t_in[k], node.child[k]};
           }
         } else {
-          // Sorted into their places, the nearest on top.
           const size_t bottom = top;
-          for (; hit != 0; hit &= hit - 1) {
-            const auto k = hwy::Num0BitsBelowLS1Bit_Nonzero32(hit);
-            const Entry entry{t_in[k], node.child[k]};
+          for (uint32_t rest = hit & (hit - 1); rest != 0; rest &= rest - 1) {
+            const auto k = hwy::Num0BitsBelowLS1Bit_Nonzero32(rest);
+            Entry entry{t_in[k], node.child[k]};
+            if (entry.t < next.t) std::swap(entry, next);
             size_t at = top++;
             for (; at > bottom && stack[at - 1].t < entry.t; --at) stack[at] = stack[at - 1];
             stack[at] = entry;
           }
         }
+        ref = next.ref;
+        continue;
       }
     }
     do {

@@ -21,52 +21,112 @@ struct Branch {
   bool is_leaf() const { return ref & LSP_LEAF_BIT; }
 };
 
+// What a visit costs, of a node and of a block of triangles; only the ratio matters.
+constexpr float kNodeCost = 1.0f, kBlockCost = 0.6f;
+
+// Chooses which binary nodes become wide ones so that the surface area heuristic's cost is least, by dynamic
+// programming (Ylitie, Karras, Laine 2017, section 3.2): cost(n, k) is that of the subtree of n cut into at
+// most k branches of one wide node.
 class Collapse {
  public:
   Collapse(const lsp_scene& scene, std::vector<WideNode>& nodes, std::vector<TriangleBlock>& blocks)
-      : scene_(scene), nodes_(nodes), blocks_(blocks), triangles_(scene.header->node_count) {
+      : scene_(scene), nodes_(nodes), blocks_(blocks), plans_(scene.header->node_count) {
     const LspHeader& header = *scene.header;
-    if (header.root != LSP_NONE) count(header.root);
-    add_node({{header.bounds_min, header.bounds_max, header.root}});
+    const Branch root{header.bounds_min, header.bounds_max, header.root};
+    if (header.root == LSP_NONE) {
+      add_node({});
+      return;
+    }
+    plan(root);
+    if (is_leaf(root))
+      add_node({root});
+    else
+      add_node(branches_of(root));
   }
 
  private:
+  struct Plan {
+    float cost[kWideChildren] = {};    // [k - 1]: with at most k branches
+    uint8_t left[kWideChildren] = {};  // branches for child 0 where it is cut into exactly k; 0: not cut
+    uint32_t triangles = 0;
+    bool leaf = false;  // best ended here, in one block
+  };
+
   static uint32_t leaf_count(uint32_t ref) {
     return ((ref >> LSP_LEAF_COUNT_SHIFT) & LSP_LEAF_COUNT_MASK) + 1;
   }
-
-  // Triangles below a reference; recursion is as deep as the tree, which the format bounds.
-  uint32_t count(uint32_t ref) {
-    if (ref == LSP_NONE) return 0;
-    if (ref & LSP_LEAF_BIT) return leaf_count(ref);
-    const LspNode& node = scene_.nodes[ref];
-    return triangles_[ref] = count(node.child0) + count(node.child1);
+  static Branch child_of(const LspNode& node, int k) {
+    return k == 0 ? Branch{node.lo0, node.hi0, node.child0} : Branch{node.lo1, node.hi1, node.child1};
   }
 
-  // One block holds it all: no need to go on.
-  bool is_small(const Branch& branch) const {
-    return branch.is_leaf() || triangles_[branch.ref] <= kBlockTriangles;
+  bool is_leaf(const Branch& branch) const { return branch.is_leaf() || plans_[branch.ref].leaf; }
+
+  uint32_t triangles_of(const Branch& branch) const {
+    if (branch.ref == LSP_NONE) return 0;
+    return branch.is_leaf() ? leaf_count(branch.ref) : plans_[branch.ref].triangles;
   }
 
-  void expand(std::vector<Branch>& branches, size_t at) const {
-    const LspNode& node = scene_.nodes[branches[at].ref];
-    branches.erase(branches.begin() + static_cast<ptrdiff_t>(at));
-    if (node.child0 != LSP_NONE) branches.push_back({node.lo0, node.hi0, node.child0});
-    if (node.child1 != LSP_NONE) branches.push_back({node.lo1, node.hi1, node.child1});
+  float cost_of(const Branch& branch, size_t k) const {
+    if (branch.ref == LSP_NONE) return 0;
+    if (!branch.is_leaf()) return plans_[branch.ref].cost[k - 1];
+    const uint32_t blocks = (leaf_count(branch.ref) + kBlockTriangles - 1) / kBlockTriangles;
+    return branch.area() * kBlockCost * static_cast<float>(blocks);
   }
 
-  // Opens the largest branch again and again while there is room, then the rest become nodes and leaves.
-  uint32_t add_node(std::vector<Branch> branches) {
-    std::erase_if(branches, [](const Branch& branch) { return branch.ref == LSP_NONE; });
-    while (branches.size() < kWideChildren) {
-      size_t best = branches.size();
-      for (size_t i = 0; i < branches.size(); ++i) {
-        if (is_small(branches[i])) continue;
-        if (best == branches.size() || branches[i].area() > branches[best].area()) best = i;
+  // Recursion is as deep as the tree, which the format bounds.
+  void plan(const Branch& branch) {
+    if (branch.ref == LSP_NONE || branch.is_leaf()) return;
+    const LspNode& node = scene_.nodes[branch.ref];
+    const Branch children[2] = {child_of(node, 0), child_of(node, 1)};
+    for (const Branch& child : children) plan(child);
+    Plan& plan = plans_[branch.ref];
+    plan.triangles = triangles_of(children[0]) + triangles_of(children[1]);
+    float cut[kWideChildren + 1] = {};  // into at most k branches, two at least
+    for (size_t k = 2; k <= kWideChildren; ++k) {
+      cut[k] = INFINITY;
+      for (size_t left = 1; left < k; ++left) {
+        const float cost = cost_of(children[0], left) + cost_of(children[1], k - left);
+        if (cost < cut[k]) {
+          cut[k] = cost;
+          plan.left[k - 1] = static_cast<uint8_t>(left);
+        }
       }
-      if (best == branches.size()) break;
-      expand(branches, best);
     }
+    const float as_node = branch.area() * kNodeCost + cut[kWideChildren];
+    const float as_leaf = plan.triangles <= kBlockTriangles ? branch.area() * kBlockCost : INFINITY;
+    plan.leaf = as_leaf <= as_node;
+    plan.cost[0] = std::min(as_leaf, as_node);
+    for (size_t k = 2; k < kWideChildren; ++k) {
+      plan.cost[k - 1] = std::min(plan.cost[k - 2], cut[k]);
+      if (!(cut[k] < plan.cost[k - 2])) plan.left[k - 1] = 0;  // fewer branches do as well
+    }
+  }
+
+  // The branches of a wide node: what the plan cuts `branch` into.
+  std::vector<Branch> branches_of(const Branch& branch) const {
+    std::vector<Branch> out;
+    cut(branch, kWideChildren, true, out);
+    return out;
+  }
+
+  void cut(const Branch& branch, size_t k, bool is_root, std::vector<Branch>& out) const {
+    if (branch.ref == LSP_NONE) return;
+    if (!branch.is_leaf()) {
+      const Plan& plan = plans_[branch.ref];
+      if (!is_root) {
+        while (k > 1 && plan.left[k - 1] == 0) --k;
+      }
+      if (k > 1) {
+        const LspNode& node = scene_.nodes[branch.ref];
+        cut(child_of(node, 0), plan.left[k - 1], false, out);
+        cut(child_of(node, 1), k - plan.left[k - 1], false, out);
+        return;
+      }
+    }
+    out.push_back(branch);
+  }
+
+  uint32_t add_node(std::vector<Branch> branches) {
     std::stable_sort(branches.begin(), branches.end(),
                      [](const Branch& a, const Branch& b) { return a.area() > b.area(); });
     const auto index = static_cast<uint32_t>(nodes_.size());
@@ -81,7 +141,8 @@ class Collapse {
     }
     node.children = static_cast<uint32_t>(branches.size());
     for (size_t k = 0; k < branches.size(); ++k) {
-      const uint32_t child = is_small(branches[k]) ? add_leaf(branches[k].ref) : add_node({branches[k]});
+      const uint32_t child =
+          is_leaf(branches[k]) ? add_leaf(branches[k].ref) : add_node(branches_of(branches[k]));
       nodes_[index].child[k] = child;  // not through `node`: the vector may have moved
     }
     return index;
@@ -126,7 +187,7 @@ class Collapse {
   const lsp_scene& scene_;
   std::vector<WideNode>& nodes_;
   std::vector<TriangleBlock>& blocks_;
-  std::vector<uint32_t> triangles_;  // below each node of the file
+  std::vector<Plan> plans_;  // of the file's nodes
 };
 
 class WideTracer : public Tracer {

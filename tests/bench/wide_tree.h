@@ -2,9 +2,9 @@
 // traversed with SIMD. A good CPU tracer of our own, on the same tree and with the same watertight test as
 // the library's, so that what a Line Space saves is not taken from a slow baseline. No part of the product.
 //
-// Sources. Collapsing by area: Wald, Benthin, Boulos, "Getting Rid of Packets", 2008. Boxes as arrays of
-// planes chosen by the direction's signs: Afra and Szirmay-Kalos, "Stackless Multi-BVH Traversal", 2014;
-// Embree.
+// Sources. Collapsing: Ylitie, Karras, Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed
+// Wide BVHs", 2017. Boxes as arrays of planes chosen by the direction's signs: Afra and Szirmay-Kalos,
+// "Stackless Multi-BVH Traversal", 2014; Embree.
 #pragma once
 
 #include <memory>
