@@ -90,7 +90,8 @@ struct SoakReport {
   // What grows for good raises the least amount of the second half over that of the first; what comes and
   // goes does not. Drivers and the C++ library fill caches of a few kilobytes long after the first rounds.
   static constexpr size_t kLiveBytes = 64 * 1024;
-  bool steady_live() const { return live_second <= live_first + kLiveBytes; }
+  size_t layers_bytes = 0;  // what a validation layer itself is known to keep of every round
+  bool steady_live() const { return live_second <= live_first + kLiveBytes + rounds * layers_bytes; }
   bool steady_resident() const {
     return resident_second <= resident_first + resident_first / 10 + 1024 * 1024;
   }
@@ -200,13 +201,18 @@ TEST_F(Soak, NoticesAMappingKept) {
   EXPECT_FALSE(report.steady());
 }
 
-void soak_vulkan(const std::string& path, LoadPath load, double seconds, bool new_device) {
+// The synchronisation validation of layer 1.3.239 never frees its record of a command buffer, however that is
+// freed: 3,285 bytes each, in a program that creates a device, a pool and one command buffer and destroys
+// them again, and none without synchronisation validation. What was recorded adds to it: 4.4 kB for a tracer.
+constexpr size_t kLayersBytes = 6 * 1024;
+
+void soak_vulkan(const std::string& path, LoadPath load, double seconds, bool new_device, bool validate) {
   std::string why;
   if (!VulkanTracer::available(&why)) GTEST_SKIP() << why;
   const std::vector<LspRay> rays = room_rays(path, 500);
   std::vector<LspHit> cpu(rays.size()), gpu(rays.size());
   VulkanOptions options;
-  options.validation = true;
+  options.validation = validate;
   std::unique_ptr<SceneFile> file;  // an imported scene stays mapped until the next one is loaded
   std::unique_ptr<VulkanTracer> tracer;
   try {
@@ -230,7 +236,7 @@ void soak_vulkan(const std::string& path, LoadPath load, double seconds, bool ne
   // create and destroy one. With one instance kept they stay, and creating another leaves nothing behind.
   std::unique_ptr<VulkanTracer> keeper;
   if (new_device) keeper = std::move(tracer);
-  const SoakReport report = soak(path, seconds, 24, [&] {
+  SoakReport report = soak(path, seconds, 24, [&] {
     auto next = std::make_unique<SceneFile>(path);
     if (new_device) tracer = std::make_unique<VulkanTracer>(options);
     tracer->load(next->scene(), LSP_USE_EXACT | LSP_USE_APPROXIMATE, load);
@@ -247,6 +253,7 @@ void soak_vulkan(const std::string& path, LoadPath load, double seconds, bool ne
     if (new_device) tracer.reset();
   });
   tracer.reset();
+  if (new_device && validate) report.layers_bytes = kLayersBytes;
   EXPECT_TRUE(report.steady_live());
   EXPECT_TRUE(report.steady());
   EXPECT_EQ(different, 0u);
@@ -272,10 +279,13 @@ TEST_F(Soak, NoticesABufferKept) {
 #endif
 }
 
-TEST_F(Soak, OnVulkanUploading) { soak_vulkan(path_, LoadPath::kUpload, seconds_to_run() / 4, false); }
-TEST_F(Soak, OnVulkanImporting) { soak_vulkan(path_, LoadPath::kImport, seconds_to_run() / 4, false); }
+TEST_F(Soak, OnVulkanUploading) { soak_vulkan(path_, LoadPath::kUpload, seconds_to_run() / 4, false, true); }
+TEST_F(Soak, OnVulkanImporting) { soak_vulkan(path_, LoadPath::kImport, seconds_to_run() / 4, false, true); }
 TEST_F(Soak, OnVulkanWithANewDeviceEveryTime) {
-  soak_vulkan(path_, LoadPath::kUpload, seconds_to_run() / 4, true);
+  soak_vulkan(path_, LoadPath::kUpload, seconds_to_run() / 8, true, false);
+}
+TEST_F(Soak, OnVulkanWithANewValidatedDeviceEveryTime) {
+  soak_vulkan(path_, LoadPath::kUpload, seconds_to_run() / 8, true, true);
 }
 
 }  // namespace
