@@ -201,7 +201,9 @@ class GltfReader {
       } else if (!source.attributes.contains("POSITION")) {
         ++without_positions_;
       } else {
-        at->second.push_back(read_primitive(source, mode));
+        // One without a triangle would be placed all the same, as often as there are instances.
+        Primitive primitive = read_primitive(source, mode);
+        if (primitive.indices.size() >= 3) at->second.push_back(std::move(primitive));
       }
     }
     return at->second;

@@ -1,6 +1,9 @@
 #include "import/mesh_builder.h"
 
-#include <bit>
+#include <sys/random.h>
+#include <xxhash.h>
+
+#include <chrono>
 #include <cmath>
 #include <cstring>
 
@@ -31,14 +34,20 @@ glm::dvec3 geometric_normal(const glm::vec3& a, const glm::vec3& b, const glm::v
   return direction_of(glm::cross(glm::dvec3(b) - glm::dvec3(a), glm::dvec3(c) - glm::dvec3(a)));
 }
 
-uint64_t hash_of(const glm::vec3& p) {
-  // Finalizer of MurmurHash3 over the three bit patterns.
-  uint64_t h = uint64_t(std::bit_cast<uint32_t>(p.x)) << 32 | std::bit_cast<uint32_t>(p.y);
-  h ^= uint64_t(std::bit_cast<uint32_t>(p.z)) * 0x9E3779B97F4A7C15ull;
-  h = (h ^ h >> 33) * 0xFF51AFD7ED558CCDull;
-  h = (h ^ h >> 33) * 0xC4CEB9FE1A85EC53ull;
-  return h ^ h >> 33;
+// A key of this process: whoever writes a mesh cannot know which positions collide, and make welding take a
+// time that grows with the square of their number. What is welded does not depend on it.
+uint64_t hash_key() {
+  static const uint64_t key = [] {
+    uint64_t random = 0;
+    if (getrandom(&random, sizeof random, GRND_NONBLOCK) != sizeof random) {
+      random = uint64_t(std::chrono::steady_clock::now().time_since_epoch().count());
+    }
+    return random;
+  }();
+  return key;
 }
+
+uint64_t hash_of(const glm::vec3& p) { return XXH3_64bits_withSeed(&p, sizeof p, hash_key()); }
 
 }  // namespace
 

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <map>
 #include <set>
-#include <unordered_map>
 
 #include "import/mtl.h"
 #include "import/polygons.h"
@@ -183,7 +182,8 @@ class ObjReader {
   const std::string file_;
   MeshBuilder& builder_;
   PolygonSoup soup_;
-  std::unordered_map<std::string, uint32_t> names_{{std::string(kDefaultMaterial), 0}};
+  // In order, not hashed: a file can choose names that a hash table takes ages over.
+  std::map<std::string, uint32_t> names_{{std::string(kDefaultMaterial), 0}};
   std::vector<std::string> used_{std::string(kDefaultMaterial)};  // names, by the number in soup_.materials
   uint32_t material_ = 0;
   std::vector<std::string> libraries_;
