@@ -13,6 +13,7 @@ namespace lsp::subset {
 
 using glm::vec2;
 using glm::ivec3;
+using glm::uvec4;
 using glm::vec3;
 using uint = uint32_t;
 

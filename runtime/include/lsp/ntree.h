@@ -102,6 +102,7 @@ LSP_FN LspBest lsp_traverse(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod
   vec3 next = lsp_ntree_next(LSP_SCENE_ARG_ s, cell, ahead, size);
   bool visit = true; /* the cell is yet to be looked at; false: its child is done */
   int axis = 0;      /* of the last step */
+  uvec4 tested = uvec4(LSP_NONE, LSP_NONE, LSP_NONE, LSP_NONE); /* the last triangles, that the next cell may hold too */
 
   for (uint step = 0u; !done && step < LSP_HEADER.max_steps; ++step) {
     ivec3 local = cell - base;
@@ -127,9 +128,14 @@ LSP_FN LspBest lsp_traverse(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod
         } else if ((ref & LSP_LEAF_BIT) != 0u) {
           uint first = ref & ~LSP_LEAF_BIT;
           uint count = record.count < LSP_HEADER.max_leaf_triangles ? record.count : LSP_HEADER.max_leaf_triangles;
-          LSP_COUNT_ADD(triangles, count);
           uint i = 0u;
-          for (; i < count; ++i) lsp_triangle(LSP_SCENE_ARG_ s, LSP_REFERENCE(first + i), best);
+          for (; i < count; ++i) {
+            uint triangle = LSP_REFERENCE(first + i);
+            if (triangle == tested.x || triangle == tested.y || triangle == tested.z || triangle == tested.w) continue;
+            LSP_COUNT_ADD(triangles, 1u);
+            lsp_triangle(LSP_SCENE_ARG_ s, triangle, best);
+            tested = uvec4(tested.y, tested.z, tested.w, triangle);
+          }
           if (i != count) break;
           step += count;
         } else if ((ref & LSP_STACK_LINE_SPACE_BIT) != 0u) {
