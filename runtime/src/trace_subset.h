@@ -11,9 +11,9 @@
 
 namespace lsp::subset {
 
-using glm::vec2;
 using glm::ivec3;
 using glm::uvec4;
+using glm::vec2;
 using glm::vec3;
 using uint = uint32_t;
 
@@ -56,7 +56,7 @@ inline const T& at(const T* array, uint index, uint count) {
 #define LSP_LINE_SPACE(i) at(scene.line_spaces, i, scene.header->line_space_count)
 #define LSP_BIT_WORD(i) at(scene.bit_words, i, scene.header->bit_word_count)
 #define LSP_CANDIDATE(i) at(scene.candidates, i, scene.header->candidate_word_count)
-#define LSP_GRID(i) at(scene.grid, i, scene.header->node_count * LSP_GRID_WORDS(scene.header->ntree_branching))
+#define LSP_GRID(i) at(scene.grid, i, scene.header->node_count* LSP_GRID_WORDS(scene.header->ntree_branching))
 #define LSP_CELL(i) at(scene.cells, i, scene.header->cell_count)
 #define LSP_REFERENCE(i) at(scene.references, i, scene.header->reference_count)
 #define LSP_HAS_NORMALS (scene.normals != nullptr)
