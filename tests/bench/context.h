@@ -33,7 +33,8 @@ struct Context {
   size_t accuracy_rays() const { return quick ? 30000 : 200000; }
   size_t timing_rays() const { return quick ? 1u << 15 : 1u << 17; }
   Bake base_bake() const { return line_space_bake(quick ? 4 : 6, 9); }  // the only BVH of a quick run
-  int repeats() const { return quick ? 3 : 5; }
+  // Fewer once half of the half hour is over: a slow machine's report shall end in time too.
+  int repeats() const { return quick || seconds_since_start() > 900 ? 3 : 5; }
 
   // Runs `work` for every scene in turn. What one scene throws becomes a line of the section and a warning;
   // the others go on.

@@ -148,6 +148,7 @@ void run(const Arguments& arguments, const CommonOptions& common) {
   RunningReport running(context, arguments.output);
   running.facts() = machine_facts();
   running.facts()["threads"] = context.threads;
+  running.facts()["repeats"] = context.quick ? "3" : "5, after the first 15 minutes 3; a warm-up before them";
   if (machine_load() > 0.5) {
     context.warnings.push_back("The machine was busy before the run began (load " +
                                std::to_string(machine_load()) +

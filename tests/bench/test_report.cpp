@@ -6,6 +6,7 @@
 #include <fstream>
 #include <stdexcept>
 
+#include "answers.h"
 #include "report.h"
 #include "timing.h"
 
@@ -83,6 +84,49 @@ TEST(Report, IsWrittenWhole) {
     EXPECT_TRUE(std::filesystem::exists(directory / name)) << name;
   }
   std::filesystem::remove_all(directory);
+}
+
+TEST(Answers, TakeTheFastestWithinALimit) {
+  Answers answers;
+  answers.threads = 2;
+  answers.device = "a device";
+  answers.samples = {{"hall", "A", "approximate", 1.2, 1.5, 0.3, 0.1, 20},
+                     {"hall", "B", "approximate, near skipped", 2.0, 0.8, 0.9, 0.5, 30},
+                     {"cup", "A", "approximate", 0.9, 1.25, 0.05, 0.2, 10},
+                     {"cup", "B", "approximate", 3.0, 3.0, 5.0, 0.2, 15}};
+  answers.peers["hall"] = {1.6, 1.25, 12};
+  answers.peers["cup"] = {2.0, 0, 8};
+  const auto within = best_within(answers.samples, 1, &Sample::times);
+  EXPECT_EQ(within.at("hall").bake, "B");
+  EXPECT_EQ(within.at("cup").mode, "exact");
+  EXPECT_EQ(best_within(answers.samples, 1, &Sample::times_vulkan).at("cup").times_vulkan, 1.25);
+  std::string text;
+  for (const std::string& sentence : sentences(answers)) text += sentence + "\n";
+  // sqrt(2.0 * 1.0), sqrt(1.5 * 1.25)
+  EXPECT_NE(
+      text.find(
+          "At 1 % wrong answers, shuffled diffuse rays, the fastest approximate trace is 1.41x (1.00x cup "
+          "to 2.00x hall) the exact one on the CPU and 1.37x (1.25x cup to 1.50x hall) on Vulkan."),
+      std::string::npos)
+      << text;
+  EXPECT_NE(
+      text.find(
+          "At 0.1 % wrong answers, shuffled diffuse rays, the fastest approximate trace is 1.00x the exact "
+          "one on the CPU"),
+      std::string::npos)
+      << text;
+  EXPECT_NE(text.find("we are faster on hall at 1 % wrong answers"), std::string::npos) << text;
+  EXPECT_NE(text.find("hall 30.0 MB for 12.0"), std::string::npos) << text;
+  EXPECT_NE(
+      text.find("On the CPU (2 threads), it is not worth using (under 1.1x at 1 % wrong answers) on cup."),
+      std::string::npos)
+      << text;
+  EXPECT_NE(
+      text.find("On Vulkan (a device), it is not worth using (under 1.1x at 1 % wrong answers) on none"),
+      std::string::npos)
+      << text;
+  EXPECT_EQ(answers_section(answers).tables.at(0).rows.size(), 16u);  // limits, backends, scenes
+  EXPECT_TRUE(sentences({}).empty());
 }
 
 TEST(Timing, MedianAndSpread) {
