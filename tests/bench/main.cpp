@@ -119,6 +119,9 @@ void add_scenes(Context& context, const Arguments& arguments) {
   for (const std::string& scene : arguments.scenes) {
     if (!std::filesystem::exists(scene)) throw Failure(Exit::kFile, scene, "does not exist");
   }
+  std::error_code error;
+  std::filesystem::create_directories(context.cache, error);
+  if (error) throw Failure(Exit::kFile, context.cache.string(), "cannot be made: " + error.message());
   for (const std::string& scene : arguments.scenes) {
     context.progress("bake " + scene);
     try {

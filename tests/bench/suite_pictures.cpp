@@ -3,6 +3,9 @@
 // buy speed by noise.
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <optional>
 
 #include "context.h"
 #include "image.h"
@@ -55,7 +58,7 @@ Rendered render(Context& context, const SceneUnderTest& scene, const Baked& bake
   const ProcessResult result = run_process(command);
   if (result.exit_code != 0) {
     throw Failure(static_cast<Exit>(result.exit_code), baked.path.string(),
-                  "lsp-render failed: " + result.errors);
+                  "lsp-render failed: " + result.errors.substr(0, result.errors.find('\n')));
   }
   const Json json = Json::parse(result.output, nullptr, false);
   if (json.is_discarded())
@@ -63,6 +66,51 @@ Rendered render(Context& context, const SceneUnderTest& scene, const Baked& bake
   return {read_pfm(path.string()), json.value("indirect_seconds", 0.0),
           json.value("indirect_mrays_per_second", 0.0)};
 }
+
+// A copy of a bake whose surfaces all are polished metal, for pictures of reflections: most meshes come
+// without any surface that reflects. The bake itself where it has no materials.
+class Polished {
+ public:
+  Polished(const Baked& baked, const std::filesystem::path& folder) : baked_(baked) {
+    uint64_t first = 0;
+    uint32_t count = 0;
+    {
+      const OpenFile file(baked.path);
+      const lsp_scene& scene = file.scene();
+      if (!scene.materials || scene.header->material_count == 0) return;
+      first = static_cast<uint64_t>(reinterpret_cast<const char*>(scene.materials) -
+                                    static_cast<const char*>(scene.bytes));
+      count = scene.header->material_count;
+    }
+    copy_ = folder / (baked.path.stem().string() + "-polished.lsp");
+    std::filesystem::copy_file(baked.path, copy_, std::filesystem::copy_options::overwrite_existing);
+    baked_.path = copy_;
+    std::fstream file(copy_, std::ios::binary | std::ios::in | std::ios::out);
+    for (uint32_t i = 0; i < count; ++i) {
+      const auto at = static_cast<std::streamoff>(first + i * sizeof(LspMaterial));
+      LspMaterial material;
+      file.seekg(at).read(reinterpret_cast<char*>(&material), sizeof material);
+      material.roughness = kRoughness;
+      material.metallic = 1;
+      file.seekp(at).write(reinterpret_cast<const char*>(&material), sizeof material);
+    }
+    file.close();
+    if (!file) throw Failure(Exit::kFile, copy_.string(), "cannot be written, make room");
+  }
+  ~Polished() {
+    std::error_code ignored;
+    if (!copy_.empty()) std::filesystem::remove(copy_, ignored);
+  }
+  Polished(const Polished&) = delete;
+  Polished& operator=(const Polished&) = delete;
+
+  const Baked& baked() const { return baked_; }
+  static constexpr float kRoughness = 0.3f;
+
+ private:
+  Baked baked_;
+  std::filesystem::path copy_;
+};
 
 // So that the reference's 95th percentile is near white: pictures of dark scenes must show something too.
 float exposure_for(const std::string& effect, const Image& image) {
@@ -96,10 +144,10 @@ std::vector<Column> picture_error_columns() {
 }
 
 // Small pictures of many samples: what is left of the error when the noise is gone, and what noise costs.
-void add_measured(Context& context, SceneUnderTest& scene, const std::string& effect, Table& table) {
+void add_measured(Context& context, const SceneUnderTest& scene, const Baked& baked,
+                  const std::string& effect, Table& table) {
   const unsigned many = context.quick ? 256 : 1024;
   const std::string size = context.quick ? "64x36" : "112x63";
-  const Baked& baked = scene.base();
   const Rendered truth = render(context, scene, baked, {effect, "exact", many, size});
   const float exposure = exposure_for(effect, truth.image);
   const Shot shots[] = {{effect, "exact", 64, size},
@@ -163,11 +211,10 @@ struct Variant {
 };
 
 // The paper's figures: pictures in a row, the same detail of each below, heat maps below that.
-void add_figure(Context& context, SceneUnderTest& scene, const std::string& effect, Section& section,
-                Table& table) {
+void add_figure(Context& context, const SceneUnderTest& scene, const Baked& bvh, const Baked& ntree,
+                const std::string& effect, Section& section, Table& table) {
   const std::string size = context.quick ? "192x108" : "384x216";
   const unsigned samples = context.quick ? 16 : 64;
-  const Baked& bvh = scene.base();
   std::vector<Variant> columns = {{"exact", "exact", &bvh, {effect, "exact", samples, size}}};
   if (OpenFile(bvh.path).has_line_spaces()) {
     columns.push_back({context.quick ? "BVH, LS (9), N = 4" : "BVH, LS (9)",
@@ -179,7 +226,6 @@ void add_figure(Context& context, SceneUnderTest& scene, const std::string& effe
                        &bvh,
                        {effect, "approximate", samples, size, true}});
   }
-  const Baked& ntree = scene.bake(ntree_bake(6, 1));
   if (ntree.available)
     columns.push_back({"NTree (6, 3), LS (1)", "ntree", &ntree, {effect, "approximate", samples, size}});
 
@@ -238,7 +284,8 @@ Section pictures_suite(Context& context) {
       " samples a pixel; the detail framed in red, where the first approximate picture errs most; the "
       "difference to "
       "the exact picture as a heat map. The same random numbers drive all, so that a difference is the "
-      "approximation's and not noise. Primary rays are exact. Factors are of the time in indirect rays. Near "
+      "approximation's and not noise. For glossy pictures every surface is metal of roughness 0.3. Primary "
+      "rays are exact. Factors are of the time in indirect rays. Near "
       "field "
       "exact unless it says otherwise.");
   section.paragraphs.push_back(std::string("The table of picture errors is against an exact picture of ") +
@@ -266,8 +313,19 @@ Section pictures_suite(Context& context) {
       const std::string what = scene.name() + ", " + effect;
       context.progress("pictures: " + what);
       context.guarded(section, what, [&] {
-        add_figure(context, scene, effect, section, figures);
-        add_measured(context, scene, effect, measured);
+        const Baked& bvh = scene.base();
+        const Baked& ntree = scene.bake(ntree_bake(6, 1));
+        if (effect != "glossy") {
+          add_figure(context, scene, bvh, ntree, effect, section, figures);
+          add_measured(context, scene, bvh, effect, measured);
+          return;
+        }
+        const Polished polished(bvh, context.cache);
+        std::optional<Polished> polished_ntree;
+        if (ntree.available) polished_ntree.emplace(ntree, context.cache);
+        add_figure(context, scene, polished.baked(), polished_ntree ? polished_ntree->baked() : ntree, effect,
+                   section, figures);
+        add_measured(context, scene, polished.baked(), effect, measured);
       });
     }
   });

@@ -102,9 +102,11 @@ TEST_F(BenchProgram, MeasuresAFileAsItIs) {
                          "--resolution", "3", "--depth", "5"})
                 .exit_code,
             0);
-  const ProcessResult run =
-      bench({baked.string(), "-o", out.string(), "--quick", "--quiet", "--no-vulkan", "--suite", "peers"});
+  const ProcessResult run = bench({baked.string(), "-o", out.string(), "--quick", "--quiet", "--no-vulkan",
+                                   "--suite", "peers", "--suite", "pictures"});
   EXPECT_EQ(run.exit_code, 0) << run.errors;
+  EXPECT_TRUE(fs::exists(out / "room-ao-bvh-heat.jpg"));
+  EXPECT_FALSE(fs::exists(directory_ / "room-polished.lsp"));
   EXPECT_EQ(run.output, "");
   EXPECT_TRUE(fs::exists(out / "report.html"));
 }
