@@ -213,7 +213,7 @@ struct Variant {
 // The paper's figures: pictures in a row, the same detail of each below, heat maps below that.
 void add_figure(Context& context, const SceneUnderTest& scene, const Baked& bvh, const Baked& ntree,
                 const std::string& effect, Section& section, Table& table) {
-  const std::string size = context.quick ? "192x108" : "384x216";
+  const std::string size = context.quick ? "192x108" : "320x180";
   const unsigned samples = context.quick ? 16 : 64;
   std::vector<Variant> columns = {{"exact", "exact", &bvh, {effect, "exact", samples, size}}};
   if (OpenFile(bvh.path).has_line_spaces()) {
