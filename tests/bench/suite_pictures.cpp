@@ -146,7 +146,7 @@ std::vector<Column> picture_error_columns() {
 // Small pictures of many samples: what is left of the error when the noise is gone, and what noise costs.
 void add_measured(Context& context, const SceneUnderTest& scene, const Baked& baked,
                   const std::string& effect, Table& table) {
-  const unsigned many = context.quick ? 256 : 1024;
+  const unsigned many = context.quick || effect != "ao" ? 256 : 1024;
   const std::string size = context.quick ? "64x36" : "112x63";
   const Rendered truth = render(context, scene, baked, {effect, "exact", many, size});
   const float exposure = exposure_for(effect, truth.image);
@@ -214,7 +214,7 @@ struct Variant {
 void add_figure(Context& context, const SceneUnderTest& scene, const Baked& bvh, const Baked& ntree,
                 const std::string& effect, Section& section, Table& table) {
   const std::string size = context.quick ? "192x108" : "320x180";
-  const unsigned samples = context.quick ? 16 : 64;
+  const unsigned samples = context.quick ? 16 : effect == "ao" ? 64 : 32;
   std::vector<Variant> columns = {{"exact", "exact", &bvh, {effect, "exact", samples, size}}};
   if (OpenFile(bvh.path).has_line_spaces()) {
     columns.push_back({context.quick ? "BVH, LS (9), N = 4" : "BVH, LS (9)",
@@ -280,7 +280,7 @@ void add_figure(Context& context, const SceneUnderTest& scene, const Baked& bvh,
 Section pictures_suite(Context& context) {
   Section section{"pictures", "What the error looks like", {}, {}, {}, {}};
   section.paragraphs.push_back(
-      std::string("Rows: pictures of ") + (context.quick ? "16" : "64") +
+      std::string("Rows: pictures of ") + (context.quick ? "16" : "64, of diffuse and glossy light 32,") +
       " samples a pixel; the detail framed in red, where the first approximate picture errs most; the "
       "difference to "
       "the exact picture as a heat map. The same random numbers drive all, so that a difference is the "
@@ -289,7 +289,7 @@ Section pictures_suite(Context& context) {
       "field "
       "exact unless it says otherwise.");
   section.paragraphs.push_back(std::string("The table of picture errors is against an exact picture of ") +
-                               (context.quick ? "256" : "1024") +
+                               (context.quick ? "256" : "1024 (diffuse and glossy: 256)") +
                                " samples a pixel, N = " + (context.quick ? "4" : "6") +
                                ", D = 9. SSIM and FLIP (67 pixels a degree) are of display values at one "
                                "exposure a scene and effect; RMSE "
