@@ -165,6 +165,22 @@ TEST(IdealHit, KnowsInsideOutsideAndEdges) {
   EXPECT_FALSE(ideal_hit({{0.25f, 0.25f, 2}, 0, {0, 0, -4}, 0.25f}, triangle).inside);  // beyond tmax
 }
 
+TEST(IdealHit, GrazesWhatItRunsAlong) {
+  const std::array<glm::vec3, 3> corners = {glm::vec3(0, 0, 0), glm::vec3(1, 0, 0), glm::vec3(0, 1, 0)};
+  const auto along = [&](float y, float z) {
+    return ideal_hit({{-1, y, z}, 0, {2, 0, 0}, INFINITY}, corners);
+  };
+  EXPECT_TRUE(along(0.25f, 0).graze());
+  EXPECT_EQ(along(0.25f, 0).t, 0.5);
+  EXPECT_TRUE(along(0, 0).graze());  // along an edge
+  EXPECT_TRUE(along(0.25f, 1e-7f).graze());
+  EXPECT_FALSE(along(0.25f, 0.1f).graze());  // above it
+  EXPECT_NEAR(along(0.25f, 0.1f).edge_distance, -0.1, 1e-8);
+  EXPECT_FALSE(along(1.5f, 0).graze());  // beside it
+  EXPECT_NEAR(along(1.5f, 0).edge_distance, -0.5, 1e-12);
+  for (const float z : {0.0f, 0.1f}) EXPECT_FALSE(along(0.25f, z).inside);
+}
+
 TEST(Verdict, TellsWhoIsRight) {
   const Soup soup = soup_from({{glm::vec3(0), glm::vec3(1, 0, 0), glm::vec3(0, 1, 0)},
                                {glm::vec3(0, 0, -1), glm::vec3(1, 0, -1), glm::vec3(0, 1, -1)}});

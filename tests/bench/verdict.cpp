@@ -53,7 +53,25 @@ IdealHit ideal_hit(const LspRay& ray, const std::array<glm::vec3, 3>& corners) {
   }
   // Three float steps of the largest coordinate involved.
   hit.resolution = static_cast<double>(reach) * 3 * 0x1p-23;
-  if (slope == 0) return hit;
+  if (slope == 0 && !(length(normal) > 0)) return hit;
+  if (slope == 0) {
+    // Parallel to the plane: met where the line comes nearest to the triangle, a graze if that is near
+    // enough.
+    const Real per_length = 1 / (length(normal) * length(d));
+    Real nearest_side = INFINITY, first = INFINITY;
+    bool left = false, right = false;
+    for (const Vec& corner : p) {
+      const Real side = dot(cross(d, corner), normal) * per_length;
+      left = left || side >= 0;
+      right = right || side <= 0;
+      nearest_side = std::min(nearest_side, std::abs(side));
+      first = std::min(first, dot(corner, d) / dot(d, d));
+    }
+    const Real off = dot(normal, p[0]) / length(normal), beside = left && right ? 0 : nearest_side;
+    hit.edge_distance = -static_cast<double>(std::sqrt(off * off + beside * beside));
+    hit.t = static_cast<double>(first);
+    return hit;
+  }
   const Real t = dot(normal, p[0]) / slope;
   hit.t = static_cast<double>(t);
   const Real along = std::abs(slope) / (length(normal) * length(d));
@@ -146,7 +164,8 @@ Agreement compare_exact(const Soup& soup, std::span<const LspRay> rays, std::spa
     }
     if (verdict == Verdict::kAgree || verdict == Verdict::kTie) continue;
     sum.hit_or_miss += (ours[i].primitive == LSP_NONE) != (reference[i].primitive == LSP_NONE);
-    if (sum.examples.size() < 8) {
+    const bool fault = verdict == Verdict::kOursWrong || verdict == Verdict::kBothWrong;
+    if ((fault ? sum.faults : sum.examples).size() < 8) {
       char text[256];
       std::snprintf(text, sizeof text,
                     "ray %zu (%.9g %.9g %.9g) -> (%.9g %.9g %.9g): ours t %.9g primitive %d, reference t "
@@ -155,7 +174,7 @@ Agreement compare_exact(const Soup& soup, std::span<const LspRay> rays, std::spa
                     rays[i].direction.y, rays[i].direction.z, ours[i].t, static_cast<int>(ours[i].primitive),
                     reference[i].t, static_cast<int>(reference[i].primitive),
                     kNames[static_cast<int>(verdict)]);
-      sum.examples.push_back(text);
+      (fault ? sum.faults : sum.examples).push_back(text);
     }
   }
   sum.our_depth = spread_of(our_depth);

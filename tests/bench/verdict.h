@@ -44,7 +44,8 @@ struct Agreement {
   uint64_t rays = 0, agree = 0, ties = 0, unresolved = 0, grazes = 0, ours_wrong = 0, reference_wrong = 0,
            both_wrong = 0;
   uint64_t hit_or_miss = 0;           // of the differences beyond ties: one hits, the other does not
-  std::vector<std::string> examples;  // the first few differences in words, for the test's output
+  std::vector<std::string> faults;    // the first few wrong answers of ours in words, for the test's output
+  std::vector<std::string> examples;  // the first few other differences
   // How far the depths lie from the ideal ones where both name the same primitive, in t_resolution.
   Spread our_depth, reference_depth;
 

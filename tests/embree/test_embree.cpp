@@ -66,6 +66,7 @@ TEST_P(PaperScene, ExactAgreesWithEmbree) {
   const std::vector<LspRay> rays = surface_rays(soup, rays_per_scene(), 1);
   const std::vector<LspHit> ours = traced(file, {}, rays);
   const Agreement agreement = compare_exact(soup, rays, ours, reference_hits(embree, rays));
+  for (const std::string& fault : agreement.faults) std::cout << fault << "\n";
   for (const std::string& example : agreement.examples) std::cout << example << "\n";
   std::cout << agreement.rays << " rays: " << agreement.ties << " ties, " << agreement.unresolved
             << " unresolved, " << agreement.grazes << " grazes, " << agreement.ours_wrong << " ours wrong, "

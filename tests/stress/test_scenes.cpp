@@ -171,7 +171,8 @@ TEST_P(Scenes, BakeValidateAndTraceRight) {
       ADD_FAILURE() << finding.examples[0].path << ": " << finding.examples[0].message;
   }
 
-  const size_t count = long_run() ? 200000 : 4000;
+  // In a heap of a million that all overlap a ray tests most of them.
+  const size_t count = triangles.size() >= 100000 ? 400 : long_run() ? 200000 : 4000;
   const bench::EmbreeScene embree(scene.soup());
   std::vector<LspRay> rays = bench::surface_rays(scene.soup(), count, 1);
   for (const char* name : {"edges", "boxes"}) {
@@ -191,10 +192,7 @@ TEST_P(Scenes, BakeValidateAndTraceRight) {
             << " ties, " << agreement.unresolved << " unresolved, " << agreement.grazes << " grazes, "
             << agreement.ours_wrong << " ours wrong, " << agreement.reference_wrong << " Embree wrong, "
             << agreement.both_wrong << " both wrong\n";
-  for (const std::string& example : agreement.examples) {
-    if (example.find("ours wrong") != std::string::npos || example.find("both wrong") != std::string::npos)
-      std::cout << example << "\n";
-  }
+  for (const std::string& fault : agreement.faults) std::cout << fault << "\n";
   EXPECT_EQ(agreement.ours_wrong, 0u);
   EXPECT_EQ(agreement.both_wrong, 0u);
   for (const uint32_t flags : {LSP_TRACE_APPROXIMATE, LSP_TRACE_APPROXIMATE | LSP_TRACE_NEAR_APPROXIMATE,
