@@ -18,6 +18,10 @@ constexpr size_t kTaskReferences = 4096;  // smaller subtrees are built by one t
 // Below this depth the heuristic gives way to halving by count, so that the depth stays under LSP_MAX_STACK.
 constexpr uint32_t kMaxHeuristicDepth = LSP_MAX_STACK - 34;
 
+// Where this many nodes in a row found no spatial split worth its cost, those below are not asked any more:
+// in a heap of triangles that all overlap none ever is, and looking for one takes most of the time.
+constexpr uint32_t kPatience = 8;
+
 // A triangle, or after spatial splits the part of it inside `box`.
 struct Reference {
   Box box;
@@ -74,7 +78,7 @@ class Builder {
     const size_t spare =
         options_.spatial_splits ? size_t(double(references.size()) * options_.split_budget) : 0;
     auto root = std::make_unique<TreeNode>();
-    build_node(*root, std::move(references), spare, 0);
+    build_node(*root, std::move(references), spare, 0, kPatience);
     return root;
   }
 
@@ -83,7 +87,8 @@ class Builder {
     return mesh_.positions[mesh_.triangles[triangle][c]];
   }
 
-  void build_node(TreeNode& node, std::vector<Reference> references, size_t spare, uint32_t depth) {
+  void build_node(TreeNode& node, std::vector<Reference> references, size_t spare, uint32_t depth,
+                  uint32_t patience) {
     for (const Reference& r : references) node.box.grow(r.box);
     const size_t count = references.size();
     if (count <= 1) return make_leaf(node, references);
@@ -93,13 +98,14 @@ class Builder {
     if (depth < kMaxHeuristicDepth) {
       const ObjectSplit object = find_object_split(references);
       SpatialSplit spatial;
-      if (spare > 0 && !object.overlap.empty() &&
-          object.overlap.half_area() > options_.split_overlap * root_area_)
-        spatial = find_spatial_split(references, node.box);
+      const bool overlapping = spare > 0 && patience > 0 && !object.overlap.empty() &&
+                               object.overlap.half_area() > options_.split_overlap * root_area_;
+      if (overlapping) spatial = find_spatial_split(references, node.box);
       const double area = node.box.half_area();
       const double leaf_cost = options_.triangle_cost * double(count) * area;
       const bool use_spatial = spatial.cost < object.cost && spatial.left + spatial.right <= count + spare &&
                                spatial.left && spatial.right;
+      if (overlapping) patience = use_spatial ? kPatience : patience - 1;
       const double cost = options_.traversal_cost * area + (use_spatial ? spatial.cost : object.cost);
       if (count <= options_.max_leaf_triangles && leaf_cost <= cost) return make_leaf(node, references);
       if (use_spatial) {
@@ -129,12 +135,12 @@ class Builder {
     node.child[1] = std::make_unique<TreeNode>();
     if (count > kTaskReferences) {
       tbb::task_group tasks;
-      tasks.run([&] { build_node(*node.child[0], std::move(left), spare_left, depth + 1); });
-      build_node(*node.child[1], std::move(right), spare_right, depth + 1);
+      tasks.run([&] { build_node(*node.child[0], std::move(left), spare_left, depth + 1, patience); });
+      build_node(*node.child[1], std::move(right), spare_right, depth + 1, patience);
       tasks.wait();
     } else {
-      build_node(*node.child[0], std::move(left), spare_left, depth + 1);
-      build_node(*node.child[1], std::move(right), spare_right, depth + 1);
+      build_node(*node.child[0], std::move(left), spare_left, depth + 1, patience);
+      build_node(*node.child[1], std::move(right), spare_right, depth + 1, patience);
     }
     // Any-hit rays take child 0 first: a hit is likeliest in the larger one.
     if (node.child[1]->box.half_area() > node.child[0]->box.half_area())
@@ -231,11 +237,17 @@ class Builder {
     right.lo[axis] = std::max(right.lo[axis], plane);
   }
 
+  // Whether the borders of the bins are apart by more than rounding.
+  static bool separates(const Box& bounds, int axis) {
+    const float reach = std::max(std::fabs(bounds.lo[axis]), std::fabs(bounds.hi[axis]));
+    return bounds.hi[axis] - bounds.lo[axis] > float(kBins) * 4 * 0x1p-23f * reach;
+  }
+
   SpatialSplit find_spatial_split(const std::vector<Reference>& references, const Box& bounds) const {
     SpatialSplit best;
     for (int axis = 0; axis < 3; ++axis) {
       const Binning bin(bounds.lo[axis], bounds.hi[axis]);
-      if (bin.scale == 0) continue;
+      if (bin.scale == 0 || !separates(bounds, axis)) continue;
       std::array<Box, kBins> boxes;
       std::array<size_t, kBins> entries{}, exits{};
       for (const Reference& r : references) {
