@@ -20,6 +20,7 @@
 namespace lsp::bench {
 
 struct Context {
+  bool large = false;           // also what takes gigabytes a scene
   bool quick = false;           // smaller everything: under two minutes in all
   std::filesystem::path cache;  // bakes and pictures go here
   std::vector<std::unique_ptr<SceneUnderTest>> scenes;

@@ -18,6 +18,7 @@ struct Arguments {
   std::vector<std::string> suites;
   std::string output;
   bool quick = false;
+  bool large = false;
   bool no_vulkan = false;
   unsigned threads = 0;
 };
@@ -99,7 +100,7 @@ class RunningReport {
               "times and memory. Remove the subfolder bakes to measure them anew.");
     }
     report_.facts["run time"] = std::to_string(static_cast<int>(seconds_since_start())) + " s" +
-                                (context_.quick ? ", --quick" : "") +
+                                (context_.quick ? ", --quick" : "") + (context_.large ? ", --large" : "") +
                                 (finished ? "" : "; the run has not ended yet");
     report_.sections = sections;
     Section cost{"cost", "What this report took", {}, {}, {}, {costs_}};
@@ -139,6 +140,7 @@ void run(const Arguments& arguments, const CommonOptions& common) {
   namespace fs = std::filesystem;
   Context context;
   context.quick = arguments.quick;
+  context.large = arguments.large;
   context.cache = fs::path(arguments.output) / "bakes";
   context.threads = arguments.threads ? arguments.threads : machine_threads();
   context.answers.threads = context.threads;
@@ -217,6 +219,7 @@ int main(int argc, char** argv) {
                  "minutes for six scenes on two cores)")
       ->check(CLI::IsMember({"paper", "pareto", "scaling", "peers", "stress", "pictures"}));
   app.add_flag("--quick", arguments.quick, "Fewer rays, bakes and sizes: under two minutes for six scenes");
+  app.add_flag("--large", arguments.large, "In the paper's table also what takes gigabytes a scene");
   app.add_flag("--no-vulkan", arguments.no_vulkan, "Measure the CPU only");
   app.add_option("--threads", arguments.threads, "What 'all threads' means (default: all)")
       ->check(CLI::Range(1, 1024));

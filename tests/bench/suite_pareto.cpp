@@ -26,6 +26,7 @@ const std::vector<Swept>& swept() {
       {"preset-fast", {"--preset", "fast"}},
       {"preset-accurate", {"--preset", "accurate"}},
       {"NT6-N6-D1", {"--base", "ntree", "--resolution", "6", "--depth", "1"}},
+      {"NT6-N4-D2", {"--base", "ntree", "--branching", "6", "--resolution", "4", "--depth", "2"}},
       {"NT16-N4-D1",
        {"--base", "ntree", "--branching", "16", "--levels", "2", "--resolution", "4", "--depth", "1"}},
   };
