@@ -7,6 +7,7 @@
 #include <bit>
 #include <cmath>
 #include <glm/glm.hpp>
+#include <numeric>
 #include <optional>
 
 #include "conservative.h"
@@ -104,6 +105,8 @@ class Filler {
     std::vector<uint32_t> hit(shafts, LSP_NONE);
     const uint32_t patches = n * n;
     samples_ = shaft_samples(binary ? 1 : options_.samples);
+    every_patch_.resize(patches);
+    std::iota(every_patch_.begin(), every_patch_.end(), 0u);
     raster_.emplace(lo_, hi_, n);
     if (!gather(site_.subtree)) raster_.reset();
     for (uint32_t in = 0; in < 6; ++in)
@@ -184,8 +187,9 @@ class Filler {
         ends_[i * patches + q] = patch_point(lo_, hi_, face, q, n, samples_[i].out_x, samples_[i].out_y);
   }
 
-  // The rays of one sample from a patch to all patches of a face: what they hit, and where.
-  void cast(uint32_t sample, uint32_t face) {
+  // What the rays of one sample hit, and where: those to the given patches of a face, or, where it costs no
+  // more, those to all.
+  void cast(uint32_t sample, uint32_t face, std::span<const uint32_t> wanted) {
     const size_t patches = size_t(options_.resolution) * options_.resolution;
     const std::span t = std::span(t_).subspan(sample * patches, patches);
     const std::span records = std::span(records_).subspan(sample * patches, patches);
@@ -195,15 +199,15 @@ class Filler {
       raster_->cast(a, face, samples_[sample].out_x, samples_[sample].out_y, ends, t, records);
       return;
     }
-    rays_.resize(patches);
-    hits_.resize(patches);
-    for (uint32_t q = 0; q < patches; ++q) rays_[q] = {f3(a), 0.0f, f3(ends[q] - a), 1.0f};
+    rays_.clear();
+    hits_.resize(wanted.size());
+    for (uint32_t q : wanted) rays_.push_back({f3(a), 0.0f, f3(ends[q] - a), 1.0f});
     const lsp_trace_options trace = {options_.kind == LineSpaceKind::kBinary ? LSP_TRACE_ANY_HIT : 0u, 0.0f};
-    if (lsp_trace(&scene_, &trace, rays_.data(), hits_.data(), patches, nullptr, nullptr) != LSP_OK)
+    if (lsp_trace(&scene_, &trace, rays_.data(), hits_.data(), rays_.size(), nullptr, nullptr) != LSP_OK)
       throw Failure(Exit::kInternal, "", "the tracer refused the baker's own tree");
-    for (size_t q = 0; q < patches; ++q) {
-      t[q] = hits_[q].t;
-      records[q] = hits_[q].primitive;
+    for (size_t i = 0; i < wanted.size(); ++i) {
+      t[wanted[i]] = hits_[i].t;
+      records[wanted[i]] = hits_[i].primitive;
     }
   }
 
@@ -217,7 +221,7 @@ class Filler {
       origins_.push_back(patch_point(lo_, hi_, in, p, options_.resolution, s.in_x, s.in_y));
     t_.resize(size_t(all) * patches);
     records_.resize(size_t(all) * patches);
-    for (uint32_t i = 0; i < first; ++i) cast(i, out);
+    for (uint32_t i = 0; i < first; ++i) cast(i, out, every_patch_);
     if (all == 1) {
       std::copy_n(records_.begin(), patches, row);
       return;
@@ -229,7 +233,7 @@ class Filler {
       if (first < all && cost > kSettled * float(first)) unsettled_.push_back(q);
     }
     if (unsettled_.empty()) return;
-    for (uint32_t i = first; i < all; ++i) cast(i, out);
+    for (uint32_t i = first; i < all; ++i) cast(i, out, unsettled_);
     for (uint32_t q : unsettled_) {
       float cost;
       row[q] = choose(q, all, cost);
@@ -348,7 +352,7 @@ class Filler {
   std::vector<glm::vec3> ends_;     // by sample and patch
   std::vector<float> t_;            // by sample and patch
   std::vector<uint32_t> records_;   // likewise
-  std::vector<uint32_t> unsettled_;
+  std::vector<uint32_t> every_patch_, unsettled_;
   std::vector<LspRay> rays_;
   std::vector<LspHit> hits_;
 };

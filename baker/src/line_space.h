@@ -63,7 +63,7 @@ struct LineSpaces {
   uint64_t dropped = 0;  // sites whose Line Space had no filled shaft
 };
 
-// Computes the Line Space of every site on all threads of the current oneTBB arena, by tracing through `bvh`,
+// Computes the Line Space of every site on all threads of the current oneTBB arena, from the triangles of `bvh`,
 // whose records are `triangles`. `references` becomes, per site, its Line Space reference, LSP_NONE when no
 // shaft was filled. The result does not depend on the number of threads. `progress` is called with the share
 // done, from any thread.
