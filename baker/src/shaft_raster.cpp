@@ -15,6 +15,7 @@ namespace lsp {
 
 // How far, in patches, a ray's end may lie outside a projection and still be tested: far more than rounding
 // moves it, and the edge functions decide.
+namespace {
 constexpr float kSlack = 1e-3f;
 // Hits are looked for from this share of the way on. What a box holds is further from its sides (see Filler).
 constexpr float kNearest = 1e-4f;
@@ -120,6 +121,8 @@ LSP_CLONES void test(const Seen& s, size_t begin, size_t end, const float* x, co
     record[i] = hit ? s.record : record[i];
   }
 }
+
+}  // namespace
 
 ShaftRaster::ShaftRaster(const glm::vec3& lo, const glm::vec3& hi, uint32_t resolution)
     : lo_(lo), hi_(hi), n_(resolution) {
