@@ -16,17 +16,11 @@
 
 #include "import/import.h"
 #include "lsp/program.h"
+#include "sanitizer.h"
 
 namespace lsp::stress {
 namespace {
 
-#if defined(__has_feature)
-#if __has_feature(address_sanitizer)
-#define LSP_ADDRESS_SANITIZER
-#endif
-#elif defined(__SANITIZE_ADDRESS__)
-#define LSP_ADDRESS_SANITIZER
-#endif
 #ifdef LSP_ADDRESS_SANITIZER
 constexpr double kSeconds = 60;
 constexpr bool kMeasuresMemory = false;  // the sanitizer's own is in it

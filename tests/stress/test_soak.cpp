@@ -18,15 +18,9 @@
 #include "lsp/scene_file.hpp"
 #include "lsp/vulkan_device.hpp"
 #include "rays.h"
+#include "sanitizer.h"
 #include "scene.h"
 
-#if defined(__has_feature)
-#if __has_feature(address_sanitizer)
-#define LSP_ADDRESS_SANITIZER
-#endif
-#elif defined(__SANITIZE_ADDRESS__)
-#define LSP_ADDRESS_SANITIZER
-#endif
 #ifdef LSP_ADDRESS_SANITIZER
 extern "C" size_t __sanitizer_get_current_allocated_bytes();  // of its allocator_interface.h
 #endif
