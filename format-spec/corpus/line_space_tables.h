@@ -19,7 +19,7 @@ struct LineSpaceOptions {
   uint32_t entry_bytes = 1;  // 0 makes them binary and symmetric
   bool dense = false;
   bool directed = false;      // binary, but each direction of a shaft has a bit of its own
-  bool conservative = false;  // says of no shaft that it is empty, as any cautious builder may
+  bool conservative = false;  // binary; a shaft is empty only where that is plain to see
 };
 
 class LineSpaceTables {

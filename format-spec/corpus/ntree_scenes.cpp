@@ -50,8 +50,7 @@ struct Cell {
 
 class Builder {
  public:
-  explicit Builder(const NtreeOptions& options)
-      : options_(options), tables_({options.resolution, options.entry_bytes, false}) {}
+  explicit Builder(const NtreeOptions& options) : options_(options), tables_(table_options()) {}
 
   Image run() {
     image_.triangles = box_on_floor_triangles();
@@ -70,6 +69,12 @@ class Builder {
   }
 
  private:
+  LineSpaceOptions table_options() const {
+    return {.resolution = options_.resolution,
+            .entry_bytes = options_.entry_bytes,
+            .conservative = options_.conservative};
+  }
+
   void header() {
     LspHeader& h = image_.header;
     h.magic_0 = LSP_MAGIC_0;
@@ -145,7 +150,7 @@ class Builder {
     if (asked) {
       Image trial;
       trial.triangles = image_.triangles;
-      LineSpaceTables tables({options_.resolution, options_.entry_bytes, false});
+      LineSpaceTables tables(table_options());
       trial.line_spaces.push_back({});
       fill(trial, tables, cell);
       cell.carries = trial.line_spaces[0].filled != 0;

@@ -225,6 +225,8 @@ std::vector<ValidFile> valid_files() {
       encode(box_on_floor({.resolution = 2, .entry_bytes = 0, .directed = true})));
   add("binary-conservative", "binary Line Spaces whose clear bits would be proofs",
       encode(box_on_floor({.resolution = 1, .entry_bytes = 0, .conservative = true})));
+  add("conservative", "conservative Line Spaces with clear bits, a bit for each direction of a shaft",
+      encode(box_on_floor({.resolution = 4, .entry_bytes = 0, .directed = true, .conservative = true})));
   add("root-line-space", "the root carries a Line Space",
       encode(box_on_floor({.resolution = 1, .depths = {0}})));
   add("approximate", "no exact tree: subtrees below terminal Line Spaces are left out",
@@ -246,6 +248,8 @@ std::vector<ValidFile> valid_files() {
       encode(ntree_scene({.resolution = 1, .depths = {0}, .exact = false})));
   add("ntree-binary", "an NTree with binary Line Spaces",
       encode(ntree_scene({.resolution = 2, .depths = {1}, .entry_bytes = 0})));
+  add("ntree-conservative", "an NTree with conservative Line Spaces, the root's with clear bits",
+      encode(ntree_scene({.resolution = 4, .depths = {0, 1}, .entry_bytes = 0, .conservative = true})));
   add("ntree-empty", "an NTree without geometry", encode(empty_ntree_scene()));
   add("ntree-packed", "an NTree, every section packed", packed(full_ntree_scene()));
   add("align-4096", "sections at multiples of 4096", encode(with_alignment(full_scene(), 4096)));

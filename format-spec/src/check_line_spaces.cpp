@@ -120,6 +120,9 @@ class LineSpaceCheck {
       find(i, RuleId::kFormatBits, kFormat, "an unknown bit is set");
       sound = false;
     }
+    if ((format & LSP_FORMAT_CONSERVATIVE) && bytes != 0)
+      find(i, RuleId::kConservativeFormat, kFormat,
+           "CONSERVATIVE is set, but there are " + std::to_string(bytes) + " bytes an entry");
     return sound;
   }
 

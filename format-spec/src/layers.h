@@ -31,6 +31,8 @@ void check_line_spaces(const FileView& view, Report& report);
 void check_geometry(const FileView& view, Report& report);
 // Needs the same of an NTree, and GRID in order.
 void check_ntree_geometry(const FileView& view, Report& report);
+// Of either base structure, exact: needs leaves in order, and Line Spaces with words of their own.
+void check_conservative(const FileView& view, Report& report);
 
 // Steps of a traversal of an NTree at most: of every node the cells along a line and the way out of it, or
 // all filled cells, and every reference.

@@ -104,7 +104,8 @@ TEST_F(LspBake, WritesBinaryLineSpacesOfEveryKind) {
       ASSERT_EQ(
           run(std::string("grid.obj -o a.lsp --for visibility --resolution 4 --base ") + base + " " + kind),
           0);
-      EXPECT_EQ(std::system(("'" + validate + "' '" + (folder_ / "a.lsp").string() + "'").c_str()), 0);
+      const std::string file = (folder_ / "a.lsp").string();
+      EXPECT_EQ(std::system(("'" + validate + "' --level geometry '" + file + "'").c_str()), 0);
     }
   EXPECT_EQ(run("grid.obj -o a.lsp --conservative"), 1);
   EXPECT_EQ(run("grid.obj -o a.lsp --for ao --directed"), 1);
