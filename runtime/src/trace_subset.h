@@ -41,6 +41,7 @@ inline const T& at(const T* array, uint index, uint count) {
 #define LSP_FN static inline __attribute__((always_inline))
 #endif
 #define LSP_FN_RARE [[maybe_unused]] static __attribute__((noinline))
+#define LSP_SPLIT_FAR
 #define LSP_IN(T) const T&
 #define LSP_OUT(T) T&
 #define LSP_INOUT(T) T&

@@ -92,6 +92,15 @@ extern "C" lsp_status lsp_vulkan_check_import(const lsp_scene* scene, const lsp_
   return lsp::succeed(error);
 }
 
+extern "C" uint32_t lsp_vulkan_parts(const lsp_scene* scene) {
+  const LspHeader& header = *scene->header;
+  uint32_t parts = 0;
+  if ((header.required_features & LSP_FEATURE_BINARY) != 0) parts |= LSP_PART_BINARY;
+  if (header.normal_angle_cos > -1.0f) parts |= LSP_PART_NORMAL_ANGLE;
+  if (header.plane_tolerance > 0.0f) parts |= LSP_PART_PLANE_TOLERANCE;
+  return parts;
+}
+
 extern "C" int lsp_vulkan_next_copy(const lsp_scene* scene, const lsp_vulkan_plan* plan, uint64_t max_bytes,
                                     uint64_t* cursor, lsp_vulkan_copy* copy) {
   // The cursor counts the bytes of all buffers laid one behind the other.

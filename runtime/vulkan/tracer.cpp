@@ -42,9 +42,10 @@ class Shader {
   Shader(const Shader&) = delete;
   Shader& operator=(const Shader&) = delete;
 
-  // A pipeline for traces with `flags` whose stack has `stack` entries, for a plan like this one. The caller
-  // destroys it.
-  VkPipeline create_pipeline(const lsp_vulkan_plan& plan, bool counting, uint32_t flags, uint32_t stack) {
+  // A pipeline for traces with `flags` of a scene with this plan, whose stack has `stack` entries and which
+  // needs these parts of the shader. The caller destroys it.
+  VkPipeline create_pipeline(const lsp_vulkan_plan& plan, bool counting, uint32_t flags, uint32_t stack,
+                             uint32_t parts) {
     size_t bytes = 0;
     VkShaderModuleCreateInfo module_info{};
     module_info.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
@@ -53,11 +54,12 @@ class Shader {
     VkShaderModule module = VK_NULL_HANDLE;
     check(device_.vk.vkCreateShaderModule(device_.handle, &module_info, nullptr, &module),
           "vkCreateShaderModule");
-    const uint32_t values[] = {stack, flags};
+    const uint32_t values[] = {stack, flags, parts};
     const VkSpecializationMapEntry entries[] = {
         {LSP_VULKAN_STACK_CONSTANT, 0, sizeof(uint32_t)},
-        {LSP_VULKAN_FLAGS_CONSTANT, sizeof(uint32_t), sizeof(uint32_t)}};
-    const VkSpecializationInfo specialization{2, entries, sizeof values, values};
+        {LSP_VULKAN_FLAGS_CONSTANT, sizeof(uint32_t), sizeof(uint32_t)},
+        {LSP_VULKAN_PARTS_CONSTANT, 2 * sizeof(uint32_t), sizeof(uint32_t)}};
+    const VkSpecializationInfo specialization{3, entries, sizeof values, values};
     VkComputePipelineCreateInfo info{};
     info.sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO;
     info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
@@ -149,11 +151,15 @@ class Shader {
   VkDescriptorPool pool_ = VK_NULL_HANDLE;
 };
 
-// The pipelines for one scene's stack, one for each kind of trace, made when they are first needed.
+// The pipelines for one scene, one for each kind of trace, made when they are first needed.
 class Pipelines {
  public:
-  Pipelines(Device& device, Shader& shader, const lsp_vulkan_plan& plan, uint32_t stack)
-      : device_(device), shader_(shader), plan_(plan), stack_(stack) {}
+  Pipelines(Device& device, Shader& shader, const lsp_vulkan_plan& plan, const lsp_scene& scene)
+      : device_(device),
+        shader_(shader),
+        plan_(plan),
+        stack_(std::max(scene.header->max_stack, 1u)),
+        parts_(lsp_vulkan_parts(&scene)) {}
   ~Pipelines() {
     for (const auto& [key, pipeline] : made_) device_.vk.vkDestroyPipeline(device_.handle, pipeline, nullptr);
   }
@@ -161,7 +167,8 @@ class Pipelines {
   Pipelines& operator=(const Pipelines&) = delete;
   VkPipeline get(bool counting, uint32_t flags) {
     VkPipeline& pipeline = made_[{counting, flags}];
-    if (pipeline == VK_NULL_HANDLE) pipeline = shader_.create_pipeline(plan_, counting, flags, stack_);
+    if (pipeline == VK_NULL_HANDLE)
+      pipeline = shader_.create_pipeline(plan_, counting, flags, stack_, parts_);
     return pipeline;
   }
 
@@ -170,6 +177,7 @@ class Pipelines {
   Shader& shader_;
   lsp_vulkan_plan plan_;
   uint32_t stack_;
+  uint32_t parts_;
   std::map<std::pair<bool, uint32_t>, VkPipeline> made_;
 };
 
@@ -274,8 +282,7 @@ void VulkanTracer::Impl::unload() noexcept {
 // Makes `buffers` the scene and traces one ray, so that a device that cannot read them fails here.
 void VulkanTracer::Impl::attach(SceneBuffers&& buffers) {
   scene_buffers = std::make_unique<SceneBuffers>(std::move(buffers));
-  pipelines_ = std::make_unique<Pipelines>(*device, *shader_, scene_buffers->plan(),
-                                           std::max(scene_.header->max_stack, 1u));
+  pipelines_ = std::make_unique<Pipelines>(*device, *shader_, scene_buffers->plan(), scene_);
   const LspHeader& header = *scene_.header;
   const LspRay ray{header.bounds_min, 0.0f, {1.0f, 1.0f, 1.0f}, 3.402823e38f};
   LspHit hit;

@@ -11,6 +11,7 @@
 #include "bake.h"
 #include "import/import.h"
 #include "lsp/lsp.h"
+#include "lsp/lsp_vulkan.h"
 #include "lsp/scene_file.hpp"
 #include "lsp/vulkan_device.hpp"
 #include "rays.h"
@@ -105,8 +106,12 @@ class Baked : public testing::TestWithParam<const char*> {
   }
 
   void bake_and_compare(const Mesh& mesh, Base base, Purpose purpose, bool exact, uint32_t depth,
-                        bool conservative = false) {
+                        bool conservative = false, bool limits = false) {
     BakeOptions options;
+    if (limits) {
+      options.normal_angle_degrees = 10.0f;
+      options.plane_tolerance = 0.1f;
+    }
     options.base = base;
     options.ntree.branching = 5;
     options.purpose = purpose;
@@ -119,6 +124,10 @@ class Baked : public testing::TestWithParam<const char*> {
     if (!exact) keep_approximate_only(baked);
     write_lsp(path_, baked, "{}", {});
     const SceneFile file(path_);
+    // The shader is compiled with what the scene needs alone.
+    EXPECT_EQ(lsp_vulkan_parts(&file.scene()),
+              (purpose == Purpose::kVisibility ? LSP_PART_BINARY : 0u) |
+                  (limits ? LSP_PART_NORMAL_ANGLE | LSP_PART_PLANE_TOLERANCE : 0u));
     std::vector<LspRay> rays = surface_rays(file.scene(), 20000);
     const std::vector<LspRay> hard =
         hard_rays({file.scene().triangles, file.scene().header->triangle_count}, 2600, 3);
@@ -170,12 +179,13 @@ TEST_P(Baked, Room) {
   if (purpose == "ao") bake_and_compare(mesh, base, Purpose::kAo, true, depth);
   if (purpose == "visibility") bake_and_compare(mesh, base, Purpose::kVisibility, true, depth);
   if (purpose == "conservative") bake_and_compare(mesh, base, Purpose::kVisibility, true, depth, true);
+  if (purpose == "limits") bake_and_compare(mesh, base, Purpose::kAll, true, depth, false, true);
   if (purpose == "approximate_only") bake_and_compare(mesh, base, Purpose::kAll, false, depth);
 }
 INSTANTIATE_TEST_SUITE_P(For, Baked,
                          testing::Values("all", "ao", "visibility", "conservative", "approximate_only",
-                                         "ntree_all", "ntree_visibility", "ntree_conservative",
-                                         "ntree_approximate_only"),
+                                         "limits", "ntree_all", "ntree_visibility", "ntree_conservative",
+                                         "ntree_approximate_only", "ntree_limits"),
                          [](const auto& info) { return std::string(info.param); });
 
 using BakedScene = Baked;

@@ -16,7 +16,11 @@
  * A section the file does not have is bound to any buffer (the header's, say): it is not read.
  *
  * The stack lives in LSP_STACK_SIZE entries of 8 bytes: define it as header.max_stack, or leave it to the
- * specialization constant LSP_STACK_CONSTANT_ID (default 0), whose default is LSP_MAX_STACK. The device
+ * specialization constant LSP_STACK_CONSTANT_ID (default 0), whose default is LSP_MAX_STACK.
+ *
+ * What few scenes need (LSP_PART_* of lsp/parts.h) is left out where it is not asked for: define LSP_PARTS, or
+ * LSP_PARTS_CONSTANT_ID as the number of a specialization constant, whose default is everything;
+ * lsp_vulkan_parts of lsp/lsp_vulkan.h says what a scene needs. The device
  * should have robustBufferAccess on when files are not known to be valid.
  */
 #ifndef LSP_GLSL
@@ -36,6 +40,11 @@
 #endif
 layout(constant_id = LSP_STACK_CONSTANT_ID) const uint lsp_stack_size = LSP_MAX_STACK;
 #define LSP_STACK_SIZE lsp_stack_size
+#endif
+
+#ifdef LSP_PARTS_CONSTANT_ID
+layout(constant_id = LSP_PARTS_CONSTANT_ID) const uint lsp_parts = 0xFFFFFFFFu;
+#define LSP_PARTS lsp_parts
 #endif
 
 /* Arrays are read 16 bytes at a time, which is faster than member by member; the functions below put the

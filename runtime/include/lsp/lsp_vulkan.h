@@ -22,6 +22,7 @@
 #include <vulkan/vulkan_core.h>
 
 #include "lsp/lsp.h"
+#include "lsp/parts.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -157,9 +158,15 @@ void lsp_vulkan_record_upload_barrier(const lsp_vulkan_functions* functions, VkC
 #define LSP_VULKAN_GROUP_SIZE 64u
 
 /* Specialization constants of the shader, each a uint32_t. Stack: its entries, at least header->max_stack and
- * 1, default 96. Flags: LSP_TRACE_*, default 0; a pipeline does one kind of trace. */
+ * 1, default 96. Flags: LSP_TRACE_*, default 0; a pipeline does one kind of trace. Parts: what the scene needs of
+ * the shader, of several scenes all that any of them needs; default everything. */
 #define LSP_VULKAN_STACK_CONSTANT 0u
 #define LSP_VULKAN_FLAGS_CONSTANT 1u
+#define LSP_VULKAN_PARTS_CONSTANT 2u
+
+/* The parts of the shader that a scene needs: LSP_PART_* of lsp/parts.h. The rest costs time where it is not
+ * compiled away; with a part missing that a scene needs its answers are wrong. */
+uint32_t lsp_vulkan_parts(const lsp_scene* scene);
 
 /* Push constants, compute stage, from offset 0: rays [first, first + count) of the buffers. */
 typedef struct lsp_vulkan_trace_constants {

@@ -24,12 +24,18 @@
 #define LSP_TRAVERSE_H
 
 #include "lsp/empty_margin.h"
+#include "lsp/parts.h"
 
 #define LSP_TRACE_APPROXIMATE_BIT 0x1u
 #define LSP_TRACE_ANY_HIT_BIT 0x2u
 #define LSP_TRACE_NEAR_APPROXIMATE_BIT 0x4u
 #define LSP_TRACE_NEAR_SKIP_BIT 0x8u
 #define LSP_TRACE_SKIP_EMPTY_BIT 0x10u
+
+/* The parts compiled in. */
+#ifndef LSP_PARTS
+#define LSP_PARTS 0xFFFFFFFFu
+#endif
 
 /* LSP_TRACE_NEAR_SKIP_BIT: a surface this close to the origin, in diagonals of the box, is the one the ray
  * starts on. Wrong answers grow with it (bunny, N = 6, D = 9: 0.01 0.48 %, 0.05 0.49 %, 0.15 0.52 %; Sibenik
@@ -347,6 +353,11 @@ LSP_FN LspPassage lsp_pass(LSP_IN(LspSetup) s, LSP_IN(LspLineSpace) ls) {
   return p;
 }
 
+/* Whether a Line Space has bits alone, no candidates. */
+LSP_FN bool lsp_is_binary(LSP_IN(LspLineSpace) ls) {
+  return ((ls.format >> LSP_FORMAT_ENTRY_SHIFT) & LSP_FORMAT_ENTRY_MASK) == 0u;
+}
+
 /* The paper's algorithm 2: the candidate triangle record of a shaft, LSP_NONE when the shaft is empty. */
 LSP_FN uint lsp_candidate(LSP_SCENE_ LSP_IN(LspLineSpace) ls, uint shaft) {
   uint entry;
@@ -359,18 +370,12 @@ LSP_FN uint lsp_candidate(LSP_SCENE_ LSP_IN(LspLineSpace) ls, uint shaft) {
     entry = word.offset + uint(bitCount(word.bits & ((1u << bit) - 1u)));
   }
   uint bytes = (ls.format >> LSP_FORMAT_ENTRY_SHIFT) & LSP_FORMAT_ENTRY_MASK;
-  uint local;
-  if (bytes == 0u) {
-    local = 0u; /* binary: any triangle stands for all */
-  } else if (bytes == 1u) {
-    local = (LSP_CANDIDATE(ls.candidate_first + (entry >> 2u)) >> ((entry & 3u) * 8u)) & 0xFFu;
-    local = local == 0xFFu && (ls.format & LSP_FORMAT_DENSE) != 0u ? LSP_NONE : local;
-  } else if (bytes == 2u) {
-    local = (LSP_CANDIDATE(ls.candidate_first + (entry >> 1u)) >> ((entry & 1u) * 16u)) & 0xFFFFu;
-    local = local == 0xFFFFu && (ls.format & LSP_FORMAT_DENSE) != 0u ? LSP_NONE : local;
-  } else {
-    local = LSP_CANDIDATE(ls.candidate_first + entry);
-  }
+  if (bytes == 0u) return ls.triangle_first; /* binary: any triangle stands for all */
+  uint pack = 2u - (bytes >> 1u);            /* 4, 2 or 1 entries in a word: 2^pack */
+  uint mask = LSP_NONE >> (32u - 8u * bytes);
+  uint shift = (entry & ((1u << pack) - 1u)) * (8u * bytes);
+  uint local = (LSP_CANDIDATE(ls.candidate_first + (entry >> pack)) >> shift) & mask;
+  local = local == mask && (ls.format & LSP_FORMAT_DENSE) != 0u ? LSP_NONE : local;
   return local == LSP_NONE ? LSP_NONE : ls.triangle_first + local;
 }
 
@@ -395,7 +400,7 @@ LSP_FN void lsp_look_up(LSP_SCENE_ LSP_IN(LspSetup) s, uint index, LSP_INOUT(Lsp
   if (pass.t_in > pass.t_out || pass.t_in >= best.t) return;
   uint candidate = lsp_candidate(LSP_SCENE_ARG_ ls, pass.shaft);
   if (candidate == LSP_NONE) return;
-  if (((ls.format >> LSP_FORMAT_ENTRY_SHIFT) & LSP_FORMAT_ENTRY_MASK) == 0u) {
+  if ((LSP_PARTS & LSP_PART_BINARY) != 0u && lsp_is_binary(ls)) {
     /* A binary Line Space knows that something is hit, not where: the middle of the passage. */
     LSP_PRECISE float middle = 0.5f * (lsp_max(pass.t_in, s.tmin) + pass.t_out);
     if (!(middle > s.tmin && middle < best.t)) return;
@@ -412,7 +417,7 @@ LSP_FN void lsp_look_up(LSP_SCENE_ LSP_IN(LspSetup) s, uint index, LSP_INOUT(Lsp
   vec3 w = v0 - s.origin;
   LSP_PRECISE float t = lsp_dot(w, n) / lsp_dot(s.direction, n); /* NaN or infinite along the plane */
   float slack = 0.0f;
-  if (LSP_HEADER.plane_tolerance > 0.0f) {
+  if ((LSP_PARTS & LSP_PART_PLANE_TOLERANCE) != 0u && LSP_HEADER.plane_tolerance > 0.0f) {
     vec3 extent = LSP_LOAD3(ls.hi) - LSP_LOAD3(ls.lo);
     LSP_PRECISE float reach = LSP_HEADER.plane_tolerance * sqrt(lsp_dot(extent, extent)) / s.speed;
     slack = reach;
@@ -421,7 +426,8 @@ LSP_FN void lsp_look_up(LSP_SCENE_ LSP_IN(LspSetup) s, uint index, LSP_INOUT(Lsp
   t = t < pass.t_in ? pass.t_in : t;
   t = t > pass.t_out ? pass.t_out : t;
   if (!(t > s.tmin && t < best.t)) return;
-  if (LSP_HEADER.normal_angle_cos > -1.0f && LSP_HAS_NORMALS && (tri.flags & LSP_TRIANGLE_SMOOTH) != 0u) {
+  if ((LSP_PARTS & LSP_PART_NORMAL_ANGLE) != 0u && LSP_HEADER.normal_angle_cos > -1.0f && LSP_HAS_NORMALS &&
+      (tri.flags & LSP_TRIANGLE_SMOOTH) != 0u) {
     vec2 weights = lsp_plane_weights(s, tri, t);
     if (lsp_leaves_cone(LSP_SCENE_ARG_ candidate, weights.x, weights.y)) return;
   }
@@ -439,7 +445,7 @@ LSP_FN bool lsp_leaves_freely(LSP_SCENE_ LSP_IN(LspSetup) s, uint index) {
   if (pass.t_in > pass.t_out) return false;
   uint candidate = lsp_candidate(LSP_SCENE_ARG_ ls, pass.reverse);
   if (candidate == LSP_NONE) return true;
-  if (((ls.format >> LSP_FORMAT_ENTRY_SHIFT) & LSP_FORMAT_ENTRY_MASK) == 0u) return false;
+  if ((LSP_PARTS & LSP_PART_BINARY) != 0u && lsp_is_binary(ls)) return false;
   LspTriangle tri = LSP_TRIANGLE(candidate);
   vec3 v0 = LSP_LOAD3(tri.v0);
   vec3 n = lsp_cross(LSP_LOAD3(tri.v1) - v0, LSP_LOAD3(tri.v2) - v0);
