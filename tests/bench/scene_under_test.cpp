@@ -38,9 +38,14 @@ Bake line_space_bake(unsigned resolution, unsigned depth) {
   return {"N" + n + "-D" + d, {"--resolution", n, "--depth", d}};
 }
 
-Bake ntree_bake(unsigned branching, unsigned depth) {
-  const std::string n = std::to_string(branching), d = std::to_string(depth);
-  return {"NT" + n + "-N" + n + "-D" + d, {"--base", "ntree", "--resolution", n, "--depth", d}};
+Bake ntree_bake(unsigned branching, unsigned depth, unsigned levels) {
+  const std::string n = std::to_string(branching), d = std::to_string(depth), l = std::to_string(levels);
+  Bake bake{"NT" + n + "-N" + n + "-D" + d, {"--base", "ntree", "--resolution", n, "--depth", d}};
+  if (levels != 3) {
+    bake.name += "-L" + l;
+    bake.options.insert(bake.options.end(), {"--levels", l});
+  }
+  return bake;
 }
 
 SceneUnderTest::SceneUnderTest(const std::filesystem::path& input, const std::filesystem::path& cache,

@@ -4,6 +4,7 @@
 // LSP_EMBREE_RAYS=1000000 sets the number of rays a scene (default 200,000).
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -88,6 +89,26 @@ TEST_P(PaperScene, ExactAgreesWithEmbree) {
     differ += (any[i].primitive == LSP_NONE) != (ours[i].primitive == LSP_NONE);
   }
   EXPECT_EQ(differ, 0u);
+}
+
+// Both base structures find the same nearest point of every ray, to the bit; where two triangles meet there,
+// either.
+TEST_P(PaperScene, NTreeAnswersAsTheBvhDoes) {
+  const OpenFile bvh(tree_of(input_));
+  const OpenFile ntree(shared_bake(input_, {"--base", "ntree", "--no-line-spaces"}, LSP_BAKES_DIR));
+  const std::vector<LspRay> rays = surface_rays(soup_of(bvh.scene()), rays_per_scene(), 2);
+  const std::vector<LspHit> expected = traced(bvh, {}, rays);
+  const std::vector<LspHit> hits = traced(ntree, {}, rays);
+  size_t other_t = 0, other_primitive = 0, missed = 0;
+  for (size_t i = 0; i < rays.size(); ++i) {
+    other_t += std::bit_cast<uint32_t>(hits[i].t) != std::bit_cast<uint32_t>(expected[i].t);
+    other_primitive += hits[i].primitive != expected[i].primitive;
+    missed += expected[i].primitive == LSP_NONE;
+  }
+  std::cout << rays.size() << " rays, " << missed << " miss: " << other_primitive
+            << " meet another triangle at the same t\n";
+  EXPECT_EQ(other_t, 0u);
+  EXPECT_LT(missed, rays.size());
 }
 
 TEST_P(PaperScene, ApproximateStaysWithinItsPromise) {
