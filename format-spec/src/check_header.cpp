@@ -10,7 +10,9 @@ namespace {
 
 constexpr uint32_t kMaxSections = 256;
 constexpr uint32_t kStepsSlack = 16;
-constexpr uint32_t kMaxReferences = 1u << 30;  // a traversal marks references in their two highest bits
+// A traversal marks references to nodes in their two highest bits, to Line Spaces in three.
+constexpr uint32_t kMaxNodes = 1u << 30;
+constexpr uint32_t kMaxLineSpaces = 1u << 29;
 
 // One finding about a field of the header.
 #define LSP_HEADER_FINDING(id, field, message) \
@@ -139,8 +141,8 @@ void check_limits(const LspHeader& header, Report& report) {
     LSP_HEADER_FINDING(
         kSectionCount, section_count,
         "is " + std::to_string(header.section_count) + ", the limit is " + std::to_string(kMaxSections));
-  if (header.node_count > kMaxReferences || header.triangle_count > LSP_LEAF_FIRST_MASK + 1 ||
-      header.line_space_count > kMaxReferences || header.reference_count >= LSP_LEAF_BIT)
+  if (header.node_count > kMaxNodes || header.triangle_count > LSP_LEAF_FIRST_MASK + 1 ||
+      header.line_space_count > kMaxLineSpaces || header.reference_count >= LSP_LEAF_BIT)
     LSP_HEADER_FINDING(
         kAddressable, node_count,
         std::to_string(header.node_count) + " nodes, " + std::to_string(header.triangle_count) +

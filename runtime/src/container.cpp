@@ -34,7 +34,9 @@ constexpr KnownType kKnown[kKnownSectionCount] = {
 constexpr uint64_t kPackedAlignment = 256;
 constexpr uint32_t kMaxAlignment = 65536;
 constexpr uint64_t kStepsSlack = 16;
-constexpr uint32_t kMaxReferences = 1u << 30;  // a traversal marks references in their two highest bits
+// A traversal marks references to nodes in their two highest bits, to Line Spaces in three.
+constexpr uint32_t kMaxNodes = 1u << 30;
+constexpr uint32_t kMaxLineSpaces = 1u << 29;
 
 int known_index(uint32_t type) {
   for (int i = 0; i < kKnownSectionCount; ++i) {
@@ -124,7 +126,7 @@ lsp_status check_limits(const LspHeader& header, lsp_error* error) {
     return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, max_leaf_triangles),
                 "states leaves of %u triangles, the limit is %u", header.max_leaf_triangles, max_leaf);
   }
-  if (header.node_count > kMaxReferences || header.line_space_count > kMaxReferences ||
+  if (header.node_count > kMaxNodes || header.line_space_count > kMaxLineSpaces ||
       header.triangle_count > LSP_LEAF_FIRST_MASK + 1u) {
     return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, node_count),
                 "states more nodes, triangles or Line Spaces than a reference can name");

@@ -72,6 +72,7 @@ LSP_FN LspBest lsp_traverse(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod
       down = lsp_is_node(ref);
     }
     if (down) break; /* out of steps or of stack, or cut short */
+    uint next = LSP_NONE;
     if (ref == LSP_NONE) {
     } else if ((ref & LSP_LEAF_BIT) != 0u) {
       uint first = ref & LSP_LEAF_FIRST_MASK;
@@ -82,10 +83,14 @@ LSP_FN LspBest lsp_traverse(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod
       if (i != count) break; /* cut short; not written as i < count, which compilers take to be false here */
     } else {
       LSP_COUNT_ADD(shafts, 1u);
-      lsp_look_up(LSP_SCENE_ARG_ s, ref & ~LSP_STACK_LINE_SPACE_BIT, best);
+      if ((flags & LSP_TRACE_NEAR_SKIP_BIT) != 0u && lsp_is_near(ref))
+        next = lsp_go_on_near(LSP_SCENE_ARG_ s, ref, LSP_LINE_SPACE(ref & ~(LSP_STACK_LINE_SPACE_BIT | LSP_STACK_NEAR_BIT)).child);
+      else
+        lsp_look_up(LSP_SCENE_ARG_ s, ref & ~LSP_STACK_LINE_SPACE_BIT, best);
     }
     if (any_hit && best.triangle != LSP_NONE) top = 0u;
     ref = LSP_NONE;
+    if ((flags & LSP_TRACE_NEAR_SKIP_BIT) != 0u) ref = next;
     LSP_POP_WHERE_NONE
     done = ref == LSP_NONE && top == 0u;
     if (done) stack_ref[0] = LSP_NONE;

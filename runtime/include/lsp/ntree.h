@@ -93,6 +93,10 @@ LSP_FN LspBest lsp_traverse_cells(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, flo
     vec3 hi = lo + vec3(LSP_HEADER.ntree_size);
     ref = lsp_visit(LSP_SCENE_ARG_ s, flags, lod, LSP_HEADER.root, LSP_HEADER.root_line_space, lo, hi, t LSP_COUNTS_ARG);
   }
+  if ((flags & LSP_TRACE_NEAR_SKIP_BIT) != 0u && lsp_is_near(ref)) {
+    LSP_COUNT_ADD(shafts, 1u);
+    ref = lsp_go_on_near(LSP_SCENE_ARG_ s, ref, LSP_HEADER.root);
+  }
   bool done = ref == LSP_NONE;
   if (!done && (ref & LSP_STACK_LINE_SPACE_BIT) != 0u) {
     LSP_COUNT_ADD(shafts, 1u);
@@ -130,6 +134,10 @@ LSP_FN LspBest lsp_traverse_cells(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, flo
             if (!(t <= best.t)) ref = LSP_NONE;
           }
           if (t <= best.t) ref = lsp_visit(LSP_SCENE_ARG_ s, flags, lod, ref, record.line_space, lo, hi, t LSP_COUNTS_ARG);
+          if ((flags & LSP_TRACE_NEAR_SKIP_BIT) != 0u && lsp_is_near(ref)) {
+            LSP_COUNT_ADD(shafts, 1u);
+            ref = lsp_go_on_near(LSP_SCENE_ARG_ s, ref, record.child);
+          }
         }
         if (ref == LSP_NONE) {
         } else if ((ref & LSP_LEAF_BIT) != 0u) {

@@ -48,6 +48,8 @@
 
 /* On the stack a reference to a Line Space is its index with bit 30 set; bit 31 is a leaf's. */
 #define LSP_STACK_LINE_SPACE_BIT 0x40000000u
+/* Of a Line Space: the ray begins inside its box, and what is to be asked is whether it leaves freely. */
+#define LSP_STACK_NEAR_BIT 0x20000000u
 
 #define LSP_INFINITY uintBitsToFloat(0x7F800000u)
 #define LSP_FLOAT_MAX uintBitsToFloat(0x7F7FFFFFu)
@@ -456,6 +458,14 @@ LSP_FN bool lsp_leaves_freely(LSP_SCENE_ LSP_IN(LspSetup) s, uint index) {
   return t <= s.tmin + reach;
 }
 
+/* Whether a reference on the stack asks if the ray leaves a box freely; neither a leaf's nor LSP_NONE does. */
+LSP_FN bool lsp_is_near(uint ref) { return (ref >> 29u) == 3u; }
+
+/* Where to go on from such a reference, of the node `child`: LSP_NONE where the ray leaves freely. */
+LSP_FN uint lsp_go_on_near(LSP_SCENE_ LSP_IN(LspSetup) s, uint ref, uint child) {
+  return lsp_leaves_freely(LSP_SCENE_ARG_ s, ref & ~(LSP_STACK_LINE_SPACE_BIT | LSP_STACK_NEAR_BIT)) ? LSP_NONE : child;
+}
+
 /* Whether rounding moves a ray by no more than conservative Line Spaces allow for (lsp/empty_margin.h). */
 LSP_FN bool lsp_may_skip_empty(LSP_SCENE_ LSP_IN(LspSetup) s) {
   vec3 lo = LSP_LOAD3(LSP_HEADER.bounds_min);
@@ -474,7 +484,8 @@ LSP_FN bool lsp_is_empty(LSP_SCENE_ LSP_IN(LspSetup) s, uint index) {
   return ((LSP_BIT_WORD(ls.word_first + (pass.shaft >> 5u)).bits >> (pass.shaft & 31u)) & 1u) == 0u;
 }
 
-/* What to visit for a child hit at t_in: itself, or in an approximate trace its Line Space. */
+/* What to visit for a child hit at t_in: itself, or in an approximate trace its Line Space. It only chooses, for a
+ * device that runs both sides of every branch: what takes work is done where nodes are not waited for. */
 LSP_FN uint lsp_visit(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod, uint child, uint line_space, vec3 lo,
                       vec3 hi, float t_in LSP_COUNTS_PARAM) {
   if (line_space == LSP_NONE) return child;
@@ -485,11 +496,8 @@ LSP_FN uint lsp_visit(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod, uint
   }
   bool exists = child != LSP_NONE;
   if (t_in <= s.tmin && (flags & LSP_TRACE_NEAR_APPROXIMATE_BIT) == 0u && exists) {
-    if ((flags & LSP_TRACE_NEAR_SKIP_BIT) != 0u) {
-      LSP_COUNT_ADD(shafts, 1u);
-      if (lsp_leaves_freely(LSP_SCENE_ARG_ s, line_space & LSP_LINE_SPACE_MASK)) return LSP_NONE;
-    }
-    return child;
+    if ((flags & LSP_TRACE_NEAR_SKIP_BIT) == 0u) return child;
+    return (line_space & LSP_LINE_SPACE_MASK) | LSP_STACK_LINE_SPACE_BIT | LSP_STACK_NEAR_BIT;
   }
   if ((line_space & LSP_TERMINAL_BIT) == 0u && exists) {
     vec3 extent = hi - lo;
