@@ -373,6 +373,7 @@ LSP_FN uint lsp_candidate(LSP_SCENE_ LSP_IN(LspLineSpace) ls, uint shaft) {
   }
   uint bytes = (ls.format >> LSP_FORMAT_ENTRY_SHIFT) & LSP_FORMAT_ENTRY_MASK;
   if (bytes == 0u) return ls.triangle_first; /* binary: any triangle stands for all */
+  bytes = bytes > 2u ? 4u : bytes;           /* of an invalid file too */
   uint pack = 2u - (bytes >> 1u);            /* 4, 2 or 1 entries in a word: 2^pack */
   uint mask = LSP_NONE >> (32u - 8u * bytes);
   uint shift = (entry & ((1u << pack) - 1u)) * (8u * bytes);
