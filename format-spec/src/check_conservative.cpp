@@ -44,7 +44,6 @@ constexpr uint64_t kClipSteps = 8;
 using Point = std::array<double, 3>;
 
 Point to_point(const lsp_float3& v) { return {v.x, v.y, v.z}; }
-bool finite(const lsp_float3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
 // Axis-aligned; lower and upper coordinates by axis.
 struct Box {

@@ -19,7 +19,6 @@ struct Box {
   lsp_float3 lo, hi;
 };
 
-bool finite(const lsp_float3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 bool same(const lsp_float3& a, const lsp_float3& b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 
 bool contains(const Box& box, const lsp_float3& p, float slack) {

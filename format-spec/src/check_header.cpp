@@ -34,8 +34,6 @@ bool text_damaged(std::span<const std::byte> bytes) {
          starts_with(bytes, "\x89LSP\r\n\x1A\r\n") || starts_with(bytes, "\tLSP\r\n\x1A\n");
 }
 
-bool finite(const lsp_float3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
-
 void check_features(const LspHeader& header, const FileView& view, Report& report) {
   const uint32_t features = header.required_features;
   const auto has = [&](uint32_t type) {

@@ -92,9 +92,7 @@ class LineSpaceCheck {
 
   void check_box(uint64_t i) {
     const lsp_float3 &lo = spaces_[i].lo, &hi = spaces_[i].hi;
-    const bool finite = std::isfinite(lo.x) && std::isfinite(lo.y) && std::isfinite(lo.z) &&
-                        std::isfinite(hi.x) && std::isfinite(hi.y) && std::isfinite(hi.z);
-    if (!finite || !(lo.x < hi.x && lo.y < hi.y && lo.z < hi.z))
+    if (!finite(lo) || !finite(hi) || !(lo.x < hi.x && lo.y < hi.y && lo.z < hi.z))
       find(i, RuleId::kLineSpaceBox, kBox, "the box is not finite, flat or inside out");
   }
 

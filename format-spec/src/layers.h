@@ -1,6 +1,7 @@
 // The layers of the check, in the order in which check_file runs them. Internal to the library.
 #pragma once
 
+#include <cmath>
 #include <string>
 
 #include "check.h"
@@ -33,6 +34,11 @@ void check_geometry(const FileView& view, Report& report);
 void check_ntree_geometry(const FileView& view, Report& report);
 // Of either base structure, exact: needs leaves in order, and Line Spaces with words of their own.
 void check_conservative(const FileView& view, Report& report);
+
+// Whether all three components are.
+inline bool finite(const lsp_float3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
 
 // Steps of a traversal of an NTree at most: of every node the cells along a line and the way out of it, or
 // all filled cells, and every reference.

@@ -485,8 +485,9 @@ LSP_FN bool lsp_is_empty(LSP_SCENE_ LSP_IN(LspSetup) s, uint index) {
   return ((LSP_BIT_WORD(ls.word_first + (pass.shaft >> 5u)).bits >> (pass.shaft & 31u)) & 1u) == 0u;
 }
 
-/* What to visit for a child hit at t_in: itself, or in an approximate trace its Line Space. It only chooses, for a
- * device that runs both sides of every branch: what takes work is done where nodes are not waited for. */
+/* What to visit for a child hit at t_in: itself, or in an approximate trace its Line Space. Look-ups, but for
+ * those that skip empty shafts, are left to the caller: a device that runs both sides of every branch would do them
+ * for both children of every node. */
 LSP_FN uint lsp_visit(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod, uint child, uint line_space, vec3 lo,
                       vec3 hi, float t_in LSP_COUNTS_PARAM) {
   if (line_space == LSP_NONE) return child;
