@@ -215,15 +215,21 @@ void Device::create_device(const VulkanOptions& options) {
   imports = has_extension(physical, VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME);
   limits.max_storage_buffer_range = properties.limits.maxStorageBufferRange;
   limits.max_group_count = properties.limits.maxComputeWorkGroupCount[0];
-  if (imports) {
-    VkPhysicalDeviceExternalMemoryHostPropertiesEXT host{};
-    host.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_EXTERNAL_MEMORY_HOST_PROPERTIES_EXT;
-    VkPhysicalDeviceProperties2 all{};
-    all.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2;
-    all.pNext = &host;
-    vkGetPhysicalDeviceProperties2(physical, &all);
-    limits.import_alignment = host.minImportedHostPointerAlignment;
+  // What a device does not know stays zero: no import, no largest buffer.
+  VkPhysicalDeviceExternalMemoryHostPropertiesEXT host{};
+  host.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_EXTERNAL_MEMORY_HOST_PROPERTIES_EXT;
+  VkPhysicalDeviceMaintenance4PropertiesKHR maintenance{};
+  maintenance.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_4_PROPERTIES_KHR;
+  VkPhysicalDeviceProperties2 all{};
+  all.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2;
+  if (imports) all.pNext = &host;
+  if (has_extension(physical, VK_KHR_MAINTENANCE_4_EXTENSION_NAME)) {
+    maintenance.pNext = all.pNext;
+    all.pNext = &maintenance;
   }
+  vkGetPhysicalDeviceProperties2(physical, &all);
+  limits.import_alignment = host.minImportedHostPointerAlignment;
+  limits.max_buffer_size = maintenance.maxBufferSize;
   vkGetPhysicalDeviceMemoryProperties(physical, &memory);
 
   const float priority = 1.0f;
@@ -328,7 +334,7 @@ Buffer::Buffer(Device& device, VkDeviceSize bytes, VkBufferUsageFlags usage, VkM
       result = device.vk.vkAllocateMemory(device.handle, &allocation, nullptr, &memory_);
       if (result == VK_SUCCESS) break;
     }
-    check(result, "vkAllocateMemory");
+    check(result, ("vkAllocateMemory of " + std::to_string(requirements.size) + " bytes").c_str());
     check(device.vk.vkBindBufferMemory(device.handle, buffer_, memory_, 0), "vkBindBufferMemory");
     const VkMemoryPropertyFlags got = device.memory.memoryTypes[type].propertyFlags;
     constexpr VkMemoryPropertyFlags kMappable =

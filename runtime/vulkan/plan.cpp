@@ -58,14 +58,21 @@ extern "C" lsp_status lsp_vulkan_plan_buffers(const lsp_scene* scene, uint32_t u
     if ((uses & wanted.uses) == 0) continue;
     const LspSection* section = find_section(*scene, wanted.section);
     if (section == nullptr || section->bytes == 0) continue;
+    const auto* name = reinterpret_cast<const char*>(&section->type);
+    if (limits->max_buffer_size != 0 && section->bytes > limits->max_buffer_size) {
+      return lsp::fail(
+          error, LSP_ERROR_LIMIT, section->offset,
+          "section %.4s has %llu bytes, buffers of this device have at most %llu (maxBufferSize); trace "
+          "it on the CPU",
+          name, print(section->bytes), print(limits->max_buffer_size));
+    }
     const bool too_large = section->bytes > limits->max_storage_buffer_range;
     if (too_large && (uses & LSP_USE_ADDRESSES_IF_NEEDED) != 0) plan->addresses = 1;
     if (too_large && plan->addresses == 0) {
       return lsp::fail(error, LSP_ERROR_LIMIT, section->offset,
                        "section %.4s has %llu bytes, storage buffers of this device have at most %llu "
                        "(maxStorageBufferRange) and it has no buffer addresses; trace it on the CPU",
-                       reinterpret_cast<const char*>(&section->type), print(section->bytes),
-                       print(limits->max_storage_buffer_range));
+                       name, print(section->bytes), print(limits->max_storage_buffer_range));
     }
     plan->buffers[plan->buffer_count++] = {wanted.binding, wanted.section, section->offset, section->bytes};
     plan->bytes += section->bytes;

@@ -124,7 +124,7 @@ int main(int argc, char** argv) {
   VkPhysicalDeviceProperties device_properties;
   vkGetPhysicalDeviceProperties(gpu.physical, &device_properties);
   const lsp_vulkan_limits limits{device_properties.limits.maxStorageBufferRange, 0,
-                                 device_properties.limits.maxComputeWorkGroupCount[0]};
+                                 device_properties.limits.maxComputeWorkGroupCount[0], 0};
   check(lsp_map_file(file, &mapping, &error), error, file);
   check(lsp_open(mapping.bytes, mapping.size, &scene, &error), error, file);
   check(lsp_vulkan_plan_buffers(&scene, LSP_USE_APPROXIMATE, &limits, &plan, &error), error, file);

@@ -255,7 +255,7 @@ TEST_F(Vulkan, NoPlaceToCutLosesAHit) {
 TEST_F(Vulkan, SectionOverTheDevicesLimitIsNamed) {
   const Bytes bytes = write_raw(build_parts({}));
   const lsp_scene scene = open_scene(bytes.data(), bytes.size());
-  const lsp_vulkan_limits limits{1024, 4096, 65535};
+  const lsp_vulkan_limits limits{1024, 4096, 65535, 0};
   lsp_vulkan_plan plan;
   lsp_error error;
   EXPECT_EQ(lsp_vulkan_plan_buffers(&scene, LSP_USE_EXACT, &limits, &plan, &error), LSP_ERROR_LIMIT);
@@ -266,10 +266,15 @@ TEST_F(Vulkan, SectionOverTheDevicesLimitIsNamed) {
   ASSERT_EQ(lsp_vulkan_plan_buffers(&scene, kUses, &limits, &plan, &error), LSP_OK) << error.message;
   EXPECT_NE(plan.addresses, 0u);
   EXPECT_NE(plan.usage & VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT, 0u);
-  const lsp_vulkan_limits large{1u << 27, 4096, 65535};
+  const lsp_vulkan_limits large{1u << 27, 4096, 65535, 0};
   ASSERT_EQ(lsp_vulkan_plan_buffers(&scene, kUses, &large, &plan, &error), LSP_OK) << error.message;
   EXPECT_EQ(plan.addresses, 0u);
   EXPECT_EQ(plan.usage & VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT, 0u);
+  // Addresses do not help where no buffer may be as large.
+  const lsp_vulkan_limits small{512, 4096, 65535, 1024};
+  EXPECT_EQ(lsp_vulkan_plan_buffers(&scene, kUses, &small, &plan, &error), LSP_ERROR_LIMIT);
+  EXPECT_NE(std::string(error.message).find("at most 1024 (maxBufferSize)"), std::string::npos)
+      << error.message;
 }
 
 // Candidates that lie beyond what a storage buffer of most devices may hold (128 MiB on lavapipe).
@@ -304,7 +309,7 @@ TEST_F(Vulkan, SectionBeyondTheStorageBufferRange) {
 TEST(VulkanPlan, PiecesCoverEveryBufferOnce) {
   const Bytes bytes = write_raw(build_parts({}));
   const lsp_scene scene = open_scene(bytes.data(), bytes.size());
-  const lsp_vulkan_limits limits{1u << 30, 4096, 65535};
+  const lsp_vulkan_limits limits{1u << 30, 4096, 65535, 0};
   lsp_vulkan_plan plan;
   ASSERT_EQ(lsp_vulkan_plan_buffers(&scene, LSP_USE_EXACT | LSP_USE_APPROXIMATE | LSP_USE_MATERIALS, &limits,
                                     &plan, nullptr),

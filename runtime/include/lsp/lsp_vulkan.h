@@ -66,6 +66,7 @@ typedef struct lsp_vulkan_limits {
   uint64_t max_storage_buffer_range; /* VkPhysicalDeviceLimits::maxStorageBufferRange */
   uint64_t import_alignment; /* minImportedHostPointerAlignment; 0 without VK_EXT_external_memory_host */
   uint32_t max_group_count;  /* VkPhysicalDeviceLimits::maxComputeWorkGroupCount[0] */
+  uint64_t max_buffer_size;  /* VkPhysicalDeviceMaintenance4Properties::maxBufferSize; 0: the device does not say */
 } lsp_vulkan_limits;
 
 /* One buffer of the scene: file bytes [file_offset, file_offset + bytes) as they are. */
@@ -90,8 +91,8 @@ typedef struct lsp_vulkan_plan {
 #define LSP_VULKAN_BUFFER_USAGE (VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT)
 
 /* Plans the buffers of an open scene for `uses` (LSP_USE_*). LSP_ERROR_UNSUPPORTED when the file lacks what
- * is asked for; LSP_ERROR_LIMIT when a section is larger than a storage buffer of the device may be
- * and addresses were not allowed. */
+ * is asked for; LSP_ERROR_LIMIT when a section is larger than a buffer of the device may be, or than a storage
+ * buffer's range and addresses were not allowed. */
 lsp_status lsp_vulkan_plan_buffers(const lsp_scene* scene, uint32_t uses, const lsp_vulkan_limits* limits,
                                    lsp_vulkan_plan* plan, lsp_error* error);
 
