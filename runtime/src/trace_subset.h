@@ -40,6 +40,11 @@ inline const T& at(const T* array, uint index, uint count) {
 #else
 #define LSP_FN static inline __attribute__((always_inline))
 #endif
+#ifdef __SANITIZE_ADDRESS__
+#define LSP_MEMBER
+#else
+#define LSP_MEMBER __attribute__((always_inline))
+#endif
 #define LSP_FN_RARE [[maybe_unused]] static __attribute__((noinline))
 #define LSP_SPLIT_FAR
 #define LSP_IN(T) const T&

@@ -53,6 +53,6 @@ lsp_variant(slab_flipped traverse.h
 lsp_variant(infinite_origin traverse.h
   "if (!lsp_all_finite(o) || !lsp_all_finite(d)) return false;" "")
 lsp_variant(cell_skipped ntree.h
-  "ivec3 ahead = ivec3(gone_x ? 0 : 1, gone_y ? 0 : 1, gone_z ? 0 : 1);"
-  "ivec3 ahead = ivec3(gone_x ? 0 : 1, gone_y ? 1 : 0, gone_z ? 0 : 1);")
+  "c.next.y = lsp_ntree_next(LSP_SCENE_ARG_ s, c.cell, ahead, c.size).y;"
+  "c.next.y = lsp_ntree_next(LSP_SCENE_ARG_ s, c.cell, ivec3(1) - ahead, c.size).y;")
 file(CONFIGURE OUTPUT ${mutants_dir}/variants.inc CONTENT "${variants_inc}" @ONLY)

@@ -2,9 +2,6 @@
 #ifndef LSP_BVH_H
 #define LSP_BVH_H
 
-/* Whether a reference is an inner node's; LSP_NONE has a leaf's bit. */
-LSP_FN bool lsp_is_node(uint ref) { return (ref & (LSP_LEAF_BIT | LSP_STACK_LINE_SPACE_BIT)) == 0u; }
-
 /* What to visit next where nothing follows from the last step: of the stack, whatever is not behind the best hit.
  * A macro, for an array passed to a function is copied in GLSL. */
 #define LSP_POP_WHERE_NONE                           \
@@ -12,6 +9,54 @@ LSP_FN bool lsp_is_node(uint ref) { return (ref & (LSP_LEAF_BIT | LSP_STACK_LINE
     --top;                                           \
     if (stack_t[top] <= best.t) ref = stack_ref[top]; \
   }
+
+/* What a node leaves to visit: `first`, and of two children later `second`; LSP_NONE: nothing. */
+struct LspChildren {
+  uint first;
+  uint second;
+  float second_t; /* where the ray enters it */
+};
+
+/* Nearer of the two first; for any hit child 0, which the builder chose to be of larger area, where a hit is
+ * likeliest. */
+LSP_FN LspChildren lsp_children(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod, uint ref,
+                                float best_t LSP_COUNTS_PARAM) {
+  LSP_COUNT_ADD(nodes, 1u);
+  LspNode node = LSP_NODE(ref);
+  vec3 lo0 = LSP_LOAD3(node.lo0);
+  vec3 hi0 = LSP_LOAD3(node.hi0);
+  vec3 lo1 = LSP_LOAD3(node.lo1);
+  vec3 hi1 = LSP_LOAD3(node.hi1);
+  float t0 = lsp_box(s, lo0, hi0, best_t);
+  float t1 = lsp_box(s, lo1, hi1, best_t);
+  uint ref0 = LSP_NONE;
+  uint ref1 = LSP_NONE;
+  if (t0 <= best_t) ref0 = lsp_visit(LSP_SCENE_ARG_ s, flags, lod, node.child0, node.line_space0, lo0, hi0, t0 LSP_COUNTS_ARG);
+  if (t1 <= best_t) ref1 = lsp_visit(LSP_SCENE_ARG_ s, flags, lod, node.child1, node.line_space1, lo1, hi1, t1 LSP_COUNTS_ARG);
+  LspChildren children;
+  children.second = LSP_NONE;
+  children.second_t = t1;
+  if (ref0 == LSP_NONE || ref1 == LSP_NONE) {
+    children.first = ref0 != LSP_NONE ? ref0 : ref1;
+  } else if ((flags & LSP_TRACE_ANY_HIT_BIT) != 0u || t0 <= t1) {
+    children.first = ref0;
+    children.second = ref1;
+  } else {
+    children.first = ref1;
+    children.second = ref0;
+    children.second_t = t0;
+  }
+  return children;
+}
+
+/* What a ray visits first. */
+LSP_FN uint lsp_root(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod LSP_COUNTS_PARAM) {
+  vec3 lo = LSP_LOAD3(LSP_HEADER.bounds_min);
+  vec3 hi = LSP_LOAD3(LSP_HEADER.bounds_max);
+  float t = lsp_box(s, lo, hi, s.tmax);
+  if (!(t <= s.tmax)) return LSP_NONE;
+  return lsp_visit(LSP_SCENE_ARG_ s, flags, lod, LSP_HEADER.root, LSP_HEADER.root_line_space, lo, hi, t LSP_COUNTS_ARG);
+}
 
 /* Traces from the root. flags: LSP_TRACE_*_BIT. */
 LSP_FN LspBest lsp_traverse(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod LSP_COUNTS_PARAM) {
@@ -22,11 +67,7 @@ LSP_FN LspBest lsp_traverse(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod
   uint top = 0u;
   bool any_hit = (flags & LSP_TRACE_ANY_HIT_BIT) != 0u;
 
-  vec3 root_lo = LSP_LOAD3(LSP_HEADER.bounds_min);
-  vec3 root_hi = LSP_LOAD3(LSP_HEADER.bounds_max);
-  float root_t = lsp_box(s, root_lo, root_hi, best.t);
-  uint ref = LSP_NONE;
-  if (root_t <= best.t) ref = lsp_visit(LSP_SCENE_ARG_ s, flags, lod, LSP_HEADER.root, LSP_HEADER.root_line_space, root_lo, root_hi, root_t LSP_COUNTS_ARG);
+  uint ref = lsp_root(LSP_SCENE_ARG_ s, flags, lod LSP_COUNTS_ARG);
 
   /* First nodes, down to something to test, then the test: where invocations run in step, those that have found a
    * leaf wait for the others, and no step pays for both (Aila, Laine, "Understanding the Efficiency of Ray
@@ -40,35 +81,15 @@ LSP_FN LspBest lsp_traverse(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod
     bool down = lsp_is_node(ref);
     while (down && step < LSP_HEADER.max_steps) {
       ++step;
-      LSP_COUNT_ADD(nodes, 1u);
-      LspNode node = LSP_NODE(ref);
-      vec3 lo0 = LSP_LOAD3(node.lo0);
-      vec3 hi0 = LSP_LOAD3(node.hi0);
-      vec3 lo1 = LSP_LOAD3(node.lo1);
-      vec3 hi1 = LSP_LOAD3(node.hi1);
-      float t0 = lsp_box(s, lo0, hi0, best.t);
-      float t1 = lsp_box(s, lo1, hi1, best.t);
-      uint ref0 = LSP_NONE;
-      uint ref1 = LSP_NONE;
-      if (t0 <= best.t) ref0 = lsp_visit(LSP_SCENE_ARG_ s, flags, lod, node.child0, node.line_space0, lo0, hi0, t0 LSP_COUNTS_ARG);
-      if (t1 <= best.t) ref1 = lsp_visit(LSP_SCENE_ARG_ s, flags, lod, node.child1, node.line_space1, lo1, hi1, t1 LSP_COUNTS_ARG);
-      if (ref0 != LSP_NONE && ref1 != LSP_NONE) {
+      LspChildren children = lsp_children(LSP_SCENE_ARG_ s, flags, lod, ref, best.t LSP_COUNTS_ARG);
+      ref = children.first;
+      if (children.second != LSP_NONE) {
         if (top >= LSP_STACK_SIZE) break;
-        /* Any hit: the builder put the child of larger area first, where a hit is likeliest. */
-        if (any_hit || t0 <= t1) {
-          stack_ref[top] = ref1;
-          stack_t[top] = t1;
-          ref = ref0;
-        } else {
-          stack_ref[top] = ref0;
-          stack_t[top] = t0;
-          ref = ref1;
-        }
+        stack_ref[top] = children.second;
+        stack_t[top] = children.second_t;
         ++top;
-      } else {
-        ref = ref0 != LSP_NONE ? ref0 : ref1;
-        LSP_POP_WHERE_NONE
       }
+      LSP_POP_WHERE_NONE
       down = lsp_is_node(ref);
     }
     if (down) break; /* out of steps or of stack, or cut short */
@@ -84,9 +105,9 @@ LSP_FN LspBest lsp_traverse(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod
     } else {
       LSP_COUNT_ADD(shafts, 1u);
       if ((flags & LSP_TRACE_NEAR_SKIP_BIT) != 0u && lsp_is_near(ref))
-        next = lsp_go_on_near(LSP_SCENE_ARG_ s, ref, LSP_LINE_SPACE(ref & ~(LSP_STACK_LINE_SPACE_BIT | LSP_STACK_NEAR_BIT)).child);
+        next = lsp_go_on_near(LSP_SCENE_ARG_ s, ref, LSP_LINE_SPACE(ref & LSP_STACK_INDEX_MASK).child);
       else
-        lsp_look_up(LSP_SCENE_ARG_ s, ref & ~LSP_STACK_LINE_SPACE_BIT, best);
+        lsp_look_up(LSP_SCENE_ARG_ s, ref & LSP_STACK_INDEX_MASK, best);
     }
     if (any_hit && best.triangle != LSP_NONE) top = 0u;
     ref = LSP_NONE;

@@ -120,7 +120,7 @@ typedef struct lsp_trace_options {
   float lod; /* theta: stop at a Line Space once its box's diagonal is under lod * distance; 0: deepest only */
 } lsp_trace_options;
 
-/* Sums over the rays traced. Counting costs a few per cent; pass NULL for speed. */
+/* Sums over the rays traced. Pass NULL for speed: rays that are counted are traced one by one, see lsp_trace. */
 typedef struct lsp_trace_counts {
   uint64_t rays;
   uint64_t invalid; /* rays with a non-finite component, a zero direction or tmin > tmax: misses */
@@ -130,7 +130,9 @@ typedef struct lsp_trace_counts {
   uint64_t triangles; /* triangles tested exactly */
 } lsp_trace_counts;
 
-/* Traces rays[0, count) into hits[0, count), in this thread. Adds to *counts unless it is NULL.
+/* Traces rays[0, count) into hits[0, count), in this thread, with some 20 KiB of its stack. Adds to *counts unless it
+ * is NULL. Hand it many rays at once: approximate ones are traced in groups of 16, so that while one waits for memory
+ * the others go on.
  * LSP_ERROR_UNSUPPORTED when the file lacks what the options need: an exact tree. A file without Line Spaces
  * (a scene too small to need them) answers approximate traces exactly. */
 lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options* options, const LspRay* rays,

@@ -67,6 +67,136 @@ LSP_FN ivec3 lsp_ntree_divide(ivec3 g, float per_n) {
   return ivec3(int((float(g.x) + 0.5f) * per_n), int((float(g.y) + 0.5f) * per_n), int((float(g.z) + 0.5f) * per_n));
 }
 
+/* Where a ray is. */
+struct LspCells {
+  uint node;
+  uint depth;  /* of the node, the root's being 0 */
+  ivec3 base;  /* first cell of the node */
+  ivec3 cell;  /* global coordinates at the node's depth */
+  float size;  /* edge of its cells */
+  vec3 next;   /* where the ray crosses the far planes of the cell */
+  float t;     /* where it enters the cell */
+  int axis;    /* of the last step */
+  bool visit;  /* the cell is yet to be looked at; false: its child is done */
+};
+
+LSP_FN ivec3 lsp_ntree_ahead(LSP_IN(LspSetup) s) {
+  return ivec3(s.inverse.x < 0.0f ? 0 : 1, s.inverse.y < 0.0f ? 0 : 1, s.inverse.z < 0.0f ? 0 : 1);
+}
+
+/* To the first cell of the ray in `node`, which begins at c.base and is as deep as c.depth says. */
+LSP_FN void lsp_ntree_begin(LSP_SCENE_ LSP_IN(LspSetup) s, bool far, uint node, LSP_INOUT(LspCells) c) {
+  c.node = node;
+  c.size = lsp_ntree_cell_size(LSP_SCENE_ARG_ c.depth);
+  c.cell = far ? c.base : lsp_ntree_enter(LSP_SCENE_ARG_ s, c.base, c.size, c.t);
+  c.next = lsp_ntree_next(LSP_SCENE_ARG_ s, c.cell, lsp_ntree_ahead(s), c.size);
+  c.visit = true;
+}
+
+/* Into the child of the cell. */
+LSP_FN void lsp_ntree_down(LSP_SCENE_ LSP_IN(LspSetup) s, bool far, uint child, LSP_INOUT(LspCells) c) {
+  ++c.depth;
+  c.base = c.cell * int(LSP_HEADER.ntree_branching);
+  lsp_ntree_begin(LSP_SCENE_ARG_ s, far, child, c);
+}
+
+/* Out of the node to its cell in `parent`. */
+LSP_FN void lsp_ntree_up(LSP_SCENE_ LSP_IN(LspSetup) s, uint parent, float per_n, LSP_INOUT(LspCells) c) {
+  --c.depth;
+  c.node = parent;
+  c.cell = lsp_ntree_divide(c.base, per_n);
+  c.base = lsp_ntree_divide(c.cell, per_n) * int(LSP_HEADER.ntree_branching);
+  c.size = lsp_ntree_cell_size(LSP_SCENE_ARG_ c.depth);
+  c.next = lsp_ntree_next(LSP_SCENE_ARG_ s, c.cell, lsp_ntree_ahead(s), c.size);
+}
+
+LSP_FN uint lsp_ntree_index(LSP_SCENE_ LSP_IN(LspCells) c) {
+  ivec3 local = c.cell - c.base;
+  return LSP_CELL_INDEX(uint(local.x), uint(local.y), uint(local.z), LSP_HEADER.ntree_branching);
+}
+
+/* What to visit in the cell: LSP_NONE, a node, a Line Space, or a leaf of `count` references. */
+LSP_FN uint lsp_ntree_look(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod, bool far, float best_t,
+                           LSP_INOUT(LspCells) c, LSP_OUT(uint) count LSP_COUNTS_PARAM) {
+  LSP_COUNT_ADD(nodes, 1u);
+  count = 0u;
+  uint index = lsp_ntree_index(LSP_SCENE_ARG_ c);
+  LspBitWord word = LSP_GRID(c.node * LSP_GRID_WORDS(LSP_HEADER.ntree_branching) + (index >> 5u));
+  uint bit = index & 31u;
+  if (((word.bits >> bit) & 1u) == 0u) return LSP_NONE;
+  LspCell record = LSP_CELL(word.offset + uint(bitCount(word.bits & ((1u << bit) - 1u))));
+  count = record.count;
+  uint ref = record.child;
+  if (far || (record.line_space != LSP_NONE && (flags & (LSP_TRACE_APPROXIMATE_BIT | LSP_TRACE_SKIP_EMPTY_BIT)) != 0u)) {
+    vec3 lo = lsp_ntree_lo(LSP_SCENE_ARG_ c.cell, c.size);
+    vec3 hi = lsp_ntree_lo(LSP_SCENE_ARG_ c.cell + ivec3(1), c.size);
+    if (far) {
+      c.t = lsp_box(s, lo, hi, best_t);
+      if (!(c.t <= best_t)) ref = LSP_NONE;
+    }
+    if (c.t <= best_t) ref = lsp_visit(LSP_SCENE_ARG_ s, flags, lod, ref, record.line_space, lo, hi, c.t LSP_COUNTS_ARG);
+  }
+  return ref;
+}
+
+/* On to the next cell; true: out of the node, which has no more. */
+LSP_FN bool lsp_ntree_on(LSP_SCENE_ LSP_IN(LspSetup) s, bool far, float per_n, LSP_INOUT(LspCells) c) {
+  uint n = LSP_HEADER.ntree_branching;
+  if (far) {
+    uint cells = n * n * n;
+    uint index = lsp_ntree_next_filled(LSP_SCENE_ARG_ c.node * LSP_GRID_WORDS(n), lsp_ntree_index(LSP_SCENE_ARG_ c), cells);
+    int row = int((float(index) + 0.5f) * per_n);
+    int plane = int((float(row) + 0.5f) * per_n);
+    c.cell = c.base + ivec3(int(index) - row * int(n), row - plane * int(n), plane);
+    c.visit = index != cells;
+    return index == cells;
+  }
+  /* Out of a child the parent goes on along the same axis: its own planes may differ from the child's by a
+   * rounding, and that is any distance along a ray that is nearly parallel to them. */
+  if (c.visit) {
+    c.axis = c.next.x <= c.next.y ? (c.next.x <= c.next.z ? 0 : 2) : (c.next.y <= c.next.z ? 1 : 2);
+    c.t = lsp_max(c.t, c.axis == 0 ? c.next.x : (c.axis == 1 ? c.next.y : c.next.z));
+  }
+  ivec3 ahead = lsp_ntree_ahead(s);
+  int coordinate;
+  if (c.axis == 0) {
+    c.cell.x += 2 * ahead.x - 1;
+    coordinate = c.cell.x - c.base.x;
+    c.next.x = lsp_ntree_next(LSP_SCENE_ARG_ s, c.cell, ahead, c.size).x;
+  } else if (c.axis == 1) {
+    c.cell.y += 2 * ahead.y - 1;
+    coordinate = c.cell.y - c.base.y;
+    c.next.y = lsp_ntree_next(LSP_SCENE_ARG_ s, c.cell, ahead, c.size).y;
+  } else {
+    c.cell.z += 2 * ahead.z - 1;
+    coordinate = c.cell.z - c.base.z;
+    c.next.z = lsp_ntree_next(LSP_SCENE_ARG_ s, c.cell, ahead, c.size).z;
+  }
+  c.visit = uint(coordinate) < n;
+  return !c.visit;
+}
+
+/* What a ray visits first; sets c.t, where it enters the scene's box, and t_last, where it leaves that. */
+LSP_FN uint lsp_ntree_root(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod, LSP_OUT(LspCells) c,
+                           LSP_OUT(float) t_last LSP_COUNTS_PARAM) {
+  vec3 bounds_lo = LSP_LOAD3(LSP_HEADER.bounds_min);
+  vec3 bounds_hi = LSP_LOAD3(LSP_HEADER.bounds_max);
+  c.t = lsp_box(s, bounds_lo, bounds_hi, s.tmax);
+  c.depth = 0u;
+  c.base = ivec3(0);
+  c.axis = 0;
+  t_last = lsp_box_exit(s, bounds_lo, bounds_hi);
+  if (!(c.t <= s.tmax)) return LSP_NONE;
+  vec3 lo = LSP_LOAD3(LSP_HEADER.ntree_lo);
+  vec3 hi = lo + vec3(LSP_HEADER.ntree_size);
+  return lsp_visit(LSP_SCENE_ARG_ s, flags, lod, LSP_HEADER.root, LSP_HEADER.root_line_space, lo, hi, c.t LSP_COUNTS_ARG);
+}
+
+/* The last triangles tested, that the next cell may hold too. */
+LSP_FN bool lsp_ntree_tested(uvec4 tested, uint triangle) {
+  return triangle == tested.x || triangle == tested.y || triangle == tested.z || triangle == tested.w;
+}
+
 /* Traces from the root. far: from so far away that cells do not cover the ray, see the top of this file. */
 LSP_FN LspBest lsp_traverse_cells(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod, bool far LSP_COUNTS_PARAM) {
   LspBest best = lsp_no_best(s);
@@ -74,25 +204,10 @@ LSP_FN LspBest lsp_traverse_cells(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, flo
   /* stack[1 + depth]: the node left for its child; stack[0]: as in lsp/bvh.h. */
   uint stack[LSP_MAX_NTREE_DEPTH + 1u];
   bool any_hit = (flags & LSP_TRACE_ANY_HIT_BIT) != 0u;
-  int n = int(LSP_HEADER.ntree_branching);
-  uint un = uint(n);
-  uint words = LSP_GRID_WORDS(un);
-  float per_n = 1.0f / float(n);
-  bool gone_x = s.inverse.x < 0.0f;
-  bool gone_y = s.inverse.y < 0.0f;
-  bool gone_z = s.inverse.z < 0.0f;
-  ivec3 ahead = ivec3(gone_x ? 0 : 1, gone_y ? 0 : 1, gone_z ? 0 : 1);
-
-  vec3 bounds_lo = LSP_LOAD3(LSP_HEADER.bounds_min);
-  vec3 bounds_hi = LSP_LOAD3(LSP_HEADER.bounds_max);
-  float t = lsp_box(s, bounds_lo, bounds_hi, best.t);
-  float t_last = lsp_box_exit(s, bounds_lo, bounds_hi);
-  uint ref = LSP_NONE;
-  if (t <= best.t) {
-    vec3 lo = LSP_LOAD3(LSP_HEADER.ntree_lo);
-    vec3 hi = lo + vec3(LSP_HEADER.ntree_size);
-    ref = lsp_visit(LSP_SCENE_ARG_ s, flags, lod, LSP_HEADER.root, LSP_HEADER.root_line_space, lo, hi, t LSP_COUNTS_ARG);
-  }
+  float per_n = 1.0f / float(LSP_HEADER.ntree_branching);
+  float t_last;
+  LspCells c;
+  uint ref = lsp_ntree_root(LSP_SCENE_ARG_ s, flags, lod, c, t_last LSP_COUNTS_ARG);
   if ((flags & LSP_TRACE_NEAR_SKIP_BIT) != 0u && lsp_is_near(ref)) {
     LSP_COUNT_ADD(shafts, 1u);
     ref = lsp_go_on_near(LSP_SCENE_ARG_ s, ref, LSP_HEADER.root);
@@ -100,121 +215,53 @@ LSP_FN LspBest lsp_traverse_cells(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, flo
   bool done = ref == LSP_NONE;
   if (!done && (ref & LSP_STACK_LINE_SPACE_BIT) != 0u) {
     LSP_COUNT_ADD(shafts, 1u);
-    lsp_look_up(LSP_SCENE_ARG_ s, ref & ~LSP_STACK_LINE_SPACE_BIT, best);
+    lsp_look_up(LSP_SCENE_ARG_ s, ref & LSP_STACK_INDEX_MASK, best);
     done = true;
   }
   stack[0] = done ? LSP_NONE : 0u;
-
-  uint depth = 0u;
-  uint node = ref;
-  ivec3 base = ivec3(0);
-  float size = lsp_ntree_cell_size(LSP_SCENE_ARG_ 0u);
-  ivec3 cell = far ? base : lsp_ntree_enter(LSP_SCENE_ARG_ s, base, size, t);
-  vec3 next = lsp_ntree_next(LSP_SCENE_ARG_ s, cell, ahead, size);
-  bool visit = true; /* the cell is yet to be looked at; false: its child is done */
-  int axis = 0;      /* of the last step */
-  uvec4 tested = uvec4(LSP_NONE, LSP_NONE, LSP_NONE, LSP_NONE); /* the last triangles, that the next cell may hold too */
+  lsp_ntree_begin(LSP_SCENE_ARG_ s, far, ref, c);
+  uvec4 tested = uvec4(LSP_NONE, LSP_NONE, LSP_NONE, LSP_NONE);
 
   for (uint step = 0u; !done && step < LSP_HEADER.max_steps; ++step) {
-    ivec3 local = cell - base;
-    uint index = LSP_CELL_INDEX(uint(local.x), uint(local.y), uint(local.z), un);
-    bool entered = false;
-    if (visit) {
-      LSP_COUNT_ADD(nodes, 1u);
-      LspBitWord word = LSP_GRID(node * words + (index >> 5u));
-      uint bit = index & 31u;
-      if (((word.bits >> bit) & 1u) != 0u) {
-        LspCell record = LSP_CELL(word.offset + uint(bitCount(word.bits & ((1u << bit) - 1u))));
-        ref = record.child;
-        if (far || (record.line_space != LSP_NONE && (flags & (LSP_TRACE_APPROXIMATE_BIT | LSP_TRACE_SKIP_EMPTY_BIT)) != 0u)) {
-          vec3 lo = lsp_ntree_lo(LSP_SCENE_ARG_ cell, size);
-          vec3 hi = lsp_ntree_lo(LSP_SCENE_ARG_ cell + ivec3(1), size);
-          if (far) {
-            t = lsp_box(s, lo, hi, best.t);
-            if (!(t <= best.t)) ref = LSP_NONE;
-          }
-          if (t <= best.t) ref = lsp_visit(LSP_SCENE_ARG_ s, flags, lod, ref, record.line_space, lo, hi, t LSP_COUNTS_ARG);
-          if ((flags & LSP_TRACE_NEAR_SKIP_BIT) != 0u && lsp_is_near(ref)) {
-            LSP_COUNT_ADD(shafts, 1u);
-            ref = lsp_go_on_near(LSP_SCENE_ARG_ s, ref, record.child);
-          }
-        }
-        if (ref == LSP_NONE) {
-        } else if ((ref & LSP_LEAF_BIT) != 0u) {
-          uint first = ref & ~LSP_LEAF_BIT;
-          uint count = record.count < LSP_HEADER.max_leaf_triangles ? record.count : LSP_HEADER.max_leaf_triangles;
-          uint i = 0u;
-          for (; i < count; ++i) {
-            uint triangle = LSP_REFERENCE(first + i);
-            if (triangle == tested.x || triangle == tested.y || triangle == tested.z || triangle == tested.w) continue;
-            LSP_COUNT_ADD(triangles, 1u);
-            lsp_triangle(LSP_SCENE_ARG_ s, triangle, best);
-            tested = uvec4(tested.y, tested.z, tested.w, triangle);
-          }
-          if (i != count) break;
-          step += count;
-        } else if ((ref & LSP_STACK_LINE_SPACE_BIT) != 0u) {
-          LSP_COUNT_ADD(shafts, 1u);
-          lsp_look_up(LSP_SCENE_ARG_ s, ref & ~LSP_STACK_LINE_SPACE_BIT, best);
-        } else if (depth + 1u < LSP_MAX_NTREE_DEPTH) {
-          stack[1u + depth] = node;
-          node = ref;
-          ++depth;
-          base = cell * n;
-          size = lsp_ntree_cell_size(LSP_SCENE_ARG_ depth);
-          cell = far ? base : lsp_ntree_enter(LSP_SCENE_ARG_ s, base, size, t);
-          next = lsp_ntree_next(LSP_SCENE_ARG_ s, cell, ahead, size);
-          entered = true;
-        }
+    uint count = 0u;
+    ref = LSP_NONE;
+    if (c.visit) {
+      ref = lsp_ntree_look(LSP_SCENE_ARG_ s, flags, lod, far, best.t, c, count LSP_COUNTS_ARG);
+      if ((flags & LSP_TRACE_NEAR_SKIP_BIT) != 0u && lsp_is_near(ref)) {
+        LSP_COUNT_ADD(shafts, 1u);
+        ref = lsp_go_on_near(LSP_SCENE_ARG_ s, ref, LSP_LINE_SPACE(ref & LSP_STACK_INDEX_MASK).child);
       }
     }
-    if (!entered) {
-      /* On to the next cell; out of the node where it has no more. */
-      bool out_of_node;
-      if (far) {
-        index = lsp_ntree_next_filled(LSP_SCENE_ARG_ node * words, index, un * un * un);
-        out_of_node = index == un * un * un;
-        int row = int((float(index) + 0.5f) * per_n);
-        int plane = int((float(row) + 0.5f) * per_n);
-        cell = base + ivec3(int(index) - row * n, row - plane * n, plane);
-      } else {
-        /* Out of a child the parent goes on along the same axis: its own planes may differ from the child's by a
-         * rounding, and that is any distance along a ray that is nearly parallel to them. */
-        if (visit) {
-          axis = next.x <= next.y ? (next.x <= next.z ? 0 : 2) : (next.y <= next.z ? 1 : 2);
-          t = lsp_max(t, axis == 0 ? next.x : (axis == 1 ? next.y : next.z));
+    if (lsp_is_node(ref) && c.depth + 1u < LSP_MAX_NTREE_DEPTH) {
+      stack[1u + c.depth] = c.node;
+      lsp_ntree_down(LSP_SCENE_ARG_ s, far, ref, c);
+    } else {
+      if (ref == LSP_NONE) {
+      } else if ((ref & LSP_LEAF_BIT) != 0u) {
+        uint first = ref & ~LSP_LEAF_BIT;
+        count = count < LSP_HEADER.max_leaf_triangles ? count : LSP_HEADER.max_leaf_triangles;
+        uint i = 0u;
+        for (; i < count; ++i) {
+          uint triangle = LSP_REFERENCE(first + i);
+          if (lsp_ntree_tested(tested, triangle)) continue;
+          LSP_COUNT_ADD(triangles, 1u);
+          lsp_triangle(LSP_SCENE_ARG_ s, triangle, best);
+          tested = uvec4(tested.y, tested.z, tested.w, triangle);
         }
-        int coordinate;
-        if (axis == 0) {
-          cell.x += gone_x ? -1 : 1;
-          coordinate = cell.x - base.x;
-          next.x = lsp_ntree_next(LSP_SCENE_ARG_ s, cell, ahead, size).x;
-        } else if (axis == 1) {
-          cell.y += gone_y ? -1 : 1;
-          coordinate = cell.y - base.y;
-          next.y = lsp_ntree_next(LSP_SCENE_ARG_ s, cell, ahead, size).y;
-        } else {
-          cell.z += gone_z ? -1 : 1;
-          coordinate = cell.z - base.z;
-          next.z = lsp_ntree_next(LSP_SCENE_ARG_ s, cell, ahead, size).z;
-        }
-        out_of_node = uint(coordinate) >= un;
+        if (i != count) break;
+        step += count;
+      } else if ((ref & LSP_STACK_LINE_SPACE_BIT) != 0u) {
+        LSP_COUNT_ADD(shafts, 1u);
+        lsp_look_up(LSP_SCENE_ARG_ s, ref & LSP_STACK_INDEX_MASK, best);
       }
-      visit = !out_of_node;
-      bool passed = !far && (t > best.t || t > t_last);
-      if ((any_hit && best.triangle != LSP_NONE) || passed || (out_of_node && depth == 0u)) {
+      bool out_of_node = lsp_ntree_on(LSP_SCENE_ARG_ s, far, per_n, c);
+      bool passed = !far && (c.t > best.t || c.t > t_last);
+      if ((any_hit && best.triangle != LSP_NONE) || passed || (out_of_node && c.depth == 0u)) {
         done = true;
         stack[0] = LSP_NONE;
       } else if (out_of_node) {
-        --depth;
-        node = stack[1u + depth];
-        cell = lsp_ntree_divide(base, per_n);
-        base = lsp_ntree_divide(cell, per_n) * n;
-        size = lsp_ntree_cell_size(LSP_SCENE_ARG_ depth);
-        next = lsp_ntree_next(LSP_SCENE_ARG_ s, cell, ahead, size);
+        lsp_ntree_up(LSP_SCENE_ARG_ s, stack[c.depth], per_n, c);
       }
-    } else {
-      visit = true;
     }
   }
   best.complete = stack[0] == LSP_NONE;

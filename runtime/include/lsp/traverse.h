@@ -50,6 +50,7 @@
 #define LSP_STACK_LINE_SPACE_BIT 0x40000000u
 /* Of a Line Space: the ray begins inside its box, and what is to be asked is whether it leaves freely. */
 #define LSP_STACK_NEAR_BIT 0x20000000u
+#define LSP_STACK_INDEX_MASK 0x1FFFFFFFu
 
 #define LSP_INFINITY uintBitsToFloat(0x7F800000u)
 #define LSP_FLOAT_MAX uintBitsToFloat(0x7F7FFFFFu)
@@ -360,23 +361,29 @@ LSP_FN bool lsp_is_binary(LSP_IN(LspLineSpace) ls) {
   return ((ls.format >> LSP_FORMAT_ENTRY_SHIFT) & LSP_FORMAT_ENTRY_MASK) == 0u;
 }
 
-/* The paper's algorithm 2: the candidate triangle record of a shaft, LSP_NONE when the shaft is empty. */
-LSP_FN uint lsp_candidate(LSP_SCENE_ LSP_IN(LspLineSpace) ls, uint shaft) {
-  uint entry;
-  if ((ls.format & LSP_FORMAT_DENSE) != 0u) {
-    entry = shaft;
-  } else {
-    LspBitWord word = LSP_BIT_WORD(ls.word_first + (shaft >> 5u));
-    uint bit = shaft & 31u;
-    if (((word.bits >> bit) & 1u) == 0u) return LSP_NONE;
-    entry = word.offset + uint(bitCount(word.bits & ((1u << bit) - 1u)));
-  }
+/* The paper's algorithm 2: the entry of a shaft, LSP_NONE when the shaft is empty. */
+LSP_FN uint lsp_entry(LSP_SCENE_ LSP_IN(LspLineSpace) ls, uint shaft) {
+  if ((ls.format & LSP_FORMAT_DENSE) != 0u) return shaft;
+  LspBitWord word = LSP_BIT_WORD(ls.word_first + (shaft >> 5u));
+  uint bit = shaft & 31u;
+  if (((word.bits >> bit) & 1u) == 0u) return LSP_NONE;
+  return word.offset + uint(bitCount(word.bits & ((1u << bit) - 1u)));
+}
+
+/* Entries in a word of a Line Space that has candidates are 2^this: 4, 2 or 1, of an invalid file too. */
+LSP_FN uint lsp_entry_pack(LSP_IN(LspLineSpace) ls) {
   uint bytes = (ls.format >> LSP_FORMAT_ENTRY_SHIFT) & LSP_FORMAT_ENTRY_MASK;
-  if (bytes == 0u) return ls.triangle_first; /* binary: any triangle stands for all */
-  bytes = bytes > 2u ? 4u : bytes;           /* of an invalid file too */
-  uint pack = 2u - (bytes >> 1u);            /* 4, 2 or 1 entries in a word: 2^pack */
-  uint mask = LSP_NONE >> (32u - 8u * bytes);
-  uint shift = (entry & ((1u << pack) - 1u)) * (8u * bytes);
+  return bytes == 1u ? 2u : (bytes == 2u ? 1u : 0u);
+}
+
+/* The candidate triangle record of an entry, LSP_NONE when there is none. */
+LSP_FN uint lsp_candidate(LSP_SCENE_ LSP_IN(LspLineSpace) ls, uint entry) {
+  if (entry == LSP_NONE) return LSP_NONE;
+  if (lsp_is_binary(ls)) return ls.triangle_first; /* any triangle stands for all */
+  uint pack = lsp_entry_pack(ls);
+  uint bits = 32u >> pack;
+  uint mask = LSP_NONE >> (32u - bits);
+  uint shift = (entry & ((1u << pack) - 1u)) * bits;
   uint local = (LSP_CANDIDATE(ls.candidate_first + (entry >> pack)) >> shift) & mask;
   local = local == mask && (ls.format & LSP_FORMAT_DENSE) != 0u ? LSP_NONE : local;
   return local == LSP_NONE ? LSP_NONE : ls.triangle_first + local;
@@ -395,14 +402,15 @@ LSP_FN vec2 lsp_plane_weights(LSP_IN(LspSetup) s, LSP_IN(LspTriangle) tri, float
   return weights;
 }
 
-/* The paper's algorithm 1: answers the ray from the Line Space, the candidate taken as an infinite plane.
- * A plane hit outside the box by less than the tolerance is moved to the box. */
-LSP_FN void lsp_look_up(LSP_SCENE_ LSP_IN(LspSetup) s, uint index, LSP_INOUT(LspBest) best) {
-  LspLineSpace ls = LSP_LINE_SPACE(index);
-  LspPassage pass = lsp_pass(s, ls);
-  if (pass.t_in > pass.t_out || pass.t_in >= best.t) return;
-  uint candidate = lsp_candidate(LSP_SCENE_ARG_ ls, pass.shaft);
-  if (candidate == LSP_NONE) return;
+/* Whether a ray that passes the box of a Line Space may find something there that is nearer than best. */
+LSP_FN bool lsp_may_hit(LSP_IN(LspPassage) pass, LSP_IN(LspBest) best) {
+  return pass.t_in <= pass.t_out && pass.t_in < best.t;
+}
+
+/* The paper's algorithm 1, from the candidate on: it is taken as an infinite plane. A plane hit outside the box by
+ * less than the tolerance is moved to the box. */
+LSP_FN void lsp_hit_candidate(LSP_SCENE_ LSP_IN(LspSetup) s, LSP_IN(LspLineSpace) ls, LSP_IN(LspPassage) pass,
+                              uint candidate, LSP_INOUT(LspBest) best) {
   if ((LSP_PARTS & LSP_PART_BINARY) != 0u && lsp_is_binary(ls)) {
     /* A binary Line Space knows that something is hit, not where: the middle of the passage. */
     LSP_PRECISE float middle = 0.5f * (lsp_max(pass.t_in, s.tmin) + pass.t_out);
@@ -439,15 +447,18 @@ LSP_FN void lsp_look_up(LSP_SCENE_ LSP_IN(LspSetup) s, uint index, LSP_INOUT(Lsp
   best.flags = LSP_HIT_LINE_SPACE | (pass.t_in <= s.tmin ? LSP_HIT_ORIGIN_INSIDE : 0u);
 }
 
-/* Whether a ray that starts inside the box of a Line Space leaves it without meeting anything. The shaft of the
- * opposite direction knows the last surface along the ray's line; when that lies behind the origin, or is the
- * surface the ray starts on, nothing is ahead. */
-LSP_FN bool lsp_leaves_freely(LSP_SCENE_ LSP_IN(LspSetup) s, uint index) {
+/* Answers the ray from a Line Space. */
+LSP_FN void lsp_look_up(LSP_SCENE_ LSP_IN(LspSetup) s, uint index, LSP_INOUT(LspBest) best) {
   LspLineSpace ls = LSP_LINE_SPACE(index);
   LspPassage pass = lsp_pass(s, ls);
-  if (pass.t_in > pass.t_out) return false;
-  uint candidate = lsp_candidate(LSP_SCENE_ARG_ ls, pass.reverse);
-  if (candidate == LSP_NONE) return true;
+  if (!lsp_may_hit(pass, best)) return;
+  uint candidate = lsp_candidate(LSP_SCENE_ARG_ ls, lsp_entry(LSP_SCENE_ARG_ ls, pass.shaft));
+  if (candidate != LSP_NONE) lsp_hit_candidate(LSP_SCENE_ARG_ s, ls, pass, candidate, best);
+}
+
+/* Whether the last surface along the line of a ray that starts inside the box of a Line Space, which the shaft of the
+ * opposite direction knows, lies behind the origin or is the one the ray starts on: then nothing is ahead. */
+LSP_FN bool lsp_is_behind(LSP_SCENE_ LSP_IN(LspSetup) s, LSP_IN(LspLineSpace) ls, uint candidate) {
   if ((LSP_PARTS & LSP_PART_BINARY) != 0u && lsp_is_binary(ls)) return false;
   LspTriangle tri = LSP_TRIANGLE(candidate);
   vec3 v0 = LSP_LOAD3(tri.v0);
@@ -459,12 +470,24 @@ LSP_FN bool lsp_leaves_freely(LSP_SCENE_ LSP_IN(LspSetup) s, uint index) {
   return t <= s.tmin + reach;
 }
 
+/* Whether such a ray leaves the box without meeting anything. */
+LSP_FN bool lsp_leaves_freely(LSP_SCENE_ LSP_IN(LspSetup) s, uint index) {
+  LspLineSpace ls = LSP_LINE_SPACE(index);
+  LspPassage pass = lsp_pass(s, ls);
+  if (pass.t_in > pass.t_out) return false;
+  uint candidate = lsp_candidate(LSP_SCENE_ARG_ ls, lsp_entry(LSP_SCENE_ARG_ ls, pass.reverse));
+  return candidate == LSP_NONE || lsp_is_behind(LSP_SCENE_ARG_ s, ls, candidate);
+}
+
+/* Whether a reference is an inner node's; LSP_NONE has a leaf's bit. */
+LSP_FN bool lsp_is_node(uint ref) { return (ref & (LSP_LEAF_BIT | LSP_STACK_LINE_SPACE_BIT)) == 0u; }
+
 /* Whether a reference on the stack asks if the ray leaves a box freely; neither a leaf's nor LSP_NONE does. */
 LSP_FN bool lsp_is_near(uint ref) { return (ref >> 29u) == 3u; }
 
 /* Where to go on from such a reference, of the node `child`: LSP_NONE where the ray leaves freely. */
 LSP_FN uint lsp_go_on_near(LSP_SCENE_ LSP_IN(LspSetup) s, uint ref, uint child) {
-  return lsp_leaves_freely(LSP_SCENE_ARG_ s, ref & ~(LSP_STACK_LINE_SPACE_BIT | LSP_STACK_NEAR_BIT)) ? LSP_NONE : child;
+  return lsp_leaves_freely(LSP_SCENE_ARG_ s, ref & LSP_STACK_INDEX_MASK) ? LSP_NONE : child;
 }
 
 /* Whether rounding moves a ray by no more than conservative Line Spaces allow for (lsp/empty_margin.h). */
