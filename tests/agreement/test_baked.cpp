@@ -140,7 +140,8 @@ class Baked : public testing::TestWithParam<const char*> {
     constexpr uint32_t kApproximate = LSP_TRACE_APPROXIMATE;
     for (const uint32_t flags :
          {0u, LSP_TRACE_ANY_HIT, kApproximate, kApproximate | LSP_TRACE_ANY_HIT,
-          kApproximate | LSP_TRACE_NEAR_APPROXIMATE, kApproximate | LSP_TRACE_NEAR_SKIP, LSP_TRACE_SKIP_EMPTY,
+          kApproximate | LSP_TRACE_NEAR_APPROXIMATE, kApproximate | LSP_TRACE_NEAR_SKIP,
+          kApproximate | LSP_TRACE_NEAR_SKIP | LSP_TRACE_ANY_HIT, LSP_TRACE_SKIP_EMPTY,
           LSP_TRACE_SKIP_EMPTY | LSP_TRACE_ANY_HIT}) {
       if (!exact && (flags & kApproximate) == 0) continue;
       for (const float lod : {0.0f, 0.5f}) {
@@ -187,6 +188,46 @@ INSTANTIATE_TEST_SUITE_P(For, Baked,
                                          "limits", "ntree_all", "ntree_visibility", "ntree_conservative",
                                          "ntree_approximate_only", "ntree_limits"),
                          [](const auto& info) { return std::string(info.param); });
+
+// Rays that are counted are traced one by one. Those of a group answer the same, however many there are, also
+// where hits overwrite the rays.
+TEST(Groups, AnswerAsOneRayAfterTheOther) {
+  const Mesh mesh = make_room();
+  for (const Base base : {Base::kBvh, Base::kNTree}) {
+    BakeOptions options;
+    options.base = base;
+    options.ntree.branching = 5;
+    options.line_space.resolution = 4;
+    if (base == Base::kNTree) options.line_space.depths = {1, 2};
+    const std::string path =
+        (fs::temp_directory_path() / ("lsp_test_groups_" + std::to_string(getpid()) + ".lsp")).string();
+    lsp::Baked baked = bake(mesh, options);
+    write_lsp(path, baked, "{}", {});
+    const SceneFile file(path);
+    fs::remove(path);
+    std::vector<LspRay> rays = surface_rays(file.scene(), 3000);
+    const std::vector<LspRay> hard =
+        hard_rays({file.scene().triangles, file.scene().header->triangle_count}, 2600, 3);
+    rays.insert(rays.end(), hard.begin(), hard.end());
+    for (uint32_t flags = 0; flags <= LSP_TRACE_ALL_FLAGS; ++flags) {
+      SCOPED_TRACE(flags);
+      const lsp_trace_options trace{flags, 0.3f};
+      std::vector<LspHit> singly(rays.size());
+      lsp_trace_counts counts{};
+      ASSERT_EQ(lsp_trace(&file.scene(), &trace, rays.data(), singly.data(), rays.size(), &counts, nullptr),
+                LSP_OK);
+      EXPECT_GT(counts.hits, 1000u);
+      for (size_t first = 0, size = 0; first < rays.size(); first += size, ++size) {
+        size = std::min(size, rays.size() - first);
+        std::vector<LspHit> grouped(size);
+        ASSERT_EQ(lsp_trace(&file.scene(), &trace, &rays[first], grouped.data(), size, nullptr, nullptr),
+                  LSP_OK);
+        for (size_t i = 0; i < size; ++i)
+          ASSERT_EQ(memcmp(&grouped[i], &singly[first + i], sizeof(LspHit)), 0) << "ray " << first + i;
+      }
+    }
+  }
+}
 
 using BakedScene = Baked;
 TEST_P(BakedScene, Agrees) {
