@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
@@ -225,6 +226,41 @@ TEST(Groups, AnswerAsOneRayAfterTheOther) {
         for (size_t i = 0; i < size; ++i)
           ASSERT_EQ(memcmp(&grouped[i], &singly[first + i], sizeof(LspHit)), 0) << "ray " << first + i;
       }
+    }
+  }
+}
+
+// Where nearly every node carries a Line Space, a ray that asks all those it begins in takes more steps than
+// there are nodes and leaves.
+TEST(Groups, NoRayRunsOutOfSteps) {
+  for (const uint32_t triangles : {4u, 8u, 14u, 40u}) {
+    BuildOptions build;
+    build.triangles = triangles;
+    build.leaf_triangles = 2;
+    build.line_space_depth = 2;
+    Parts parts = build_parts(build);
+    const lsp_float3 lo = parts.header.bounds_min, hi = parts.header.bounds_max;
+    for (LspNode& node : parts.nodes) {
+      node.lo0 = node.lo1 = lo;
+      node.hi0 = node.hi1 = hi;
+    }
+    for (LspLineSpace& ls : parts.line_spaces) {
+      ls.lo = lo;
+      ls.hi = hi;
+      ls.scale = {4 / (hi.x - lo.x), 4 / (hi.y - lo.y), 4 / (hi.z - lo.z)};
+    }
+    const Bytes bytes = write_raw(parts);
+    lsp_scene scene;
+    lsp_error error;
+    ASSERT_EQ(lsp_open(bytes.data(), bytes.size(), &scene, &error), LSP_OK) << error.message;
+    const std::vector<LspRay> rays = surface_rays(scene, 20000);
+    std::vector<LspHit> hits(rays.size());
+    for (uint32_t flags = 0; flags <= LSP_TRACE_ALL_FLAGS; ++flags) {
+      const lsp_trace_options trace{flags, 0};
+      ASSERT_EQ(lsp_trace(&scene, &trace, rays.data(), hits.data(), rays.size(), nullptr, nullptr), LSP_OK);
+      const auto incomplete = std::count_if(
+          hits.begin(), hits.end(), [](const LspHit& h) { return (h.flags & LSP_HIT_INCOMPLETE) != 0; });
+      EXPECT_EQ(incomplete, 0) << triangles << " triangles, flags " << flags;
     }
   }
 }

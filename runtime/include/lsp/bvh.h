@@ -58,6 +58,11 @@ LSP_FN uint lsp_root(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod LSP_CO
   return lsp_visit(LSP_SCENE_ARG_ s, flags, lod, LSP_HEADER.root, LSP_HEADER.root_line_space, lo, hi, t LSP_COUNTS_ARG);
 }
 
+/* Steps that a ray takes at most: what max_steps counts and, where they are asked, the Line Spaces it begins in. */
+LSP_FN uint lsp_most_steps(LSP_SCENE_ uint flags) {
+  return LSP_HEADER.max_steps + ((flags & LSP_TRACE_NEAR_SKIP_BIT) != 0u ? LSP_HEADER.line_space_count : 0u);
+}
+
 /* Traces from the root. flags: LSP_TRACE_*_BIT. */
 LSP_FN LspBest lsp_traverse(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod LSP_COUNTS_PARAM) {
   LspBest best = lsp_no_best(s);
@@ -77,9 +82,10 @@ LSP_FN LspBest lsp_traverse(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod
    * compiler knows to hold behind a loop does not. Entry 0 of the stack is LSP_NONE once all work is done. */
   bool done = false;
   stack_ref[0] = ref;
-  for (uint step = 0u; !done && step < LSP_HEADER.max_steps; ++step) {
+  uint most = lsp_most_steps(LSP_SCENE_ARG_ flags);
+  for (uint step = 0u; !done && step < most; ++step) {
     bool down = lsp_is_node(ref);
-    while (down && step < LSP_HEADER.max_steps) {
+    while (down && step < most) {
       ++step;
       LspChildren children = lsp_children(LSP_SCENE_ARG_ s, flags, lod, ref, best.t LSP_COUNTS_ARG);
       ref = children.first;
