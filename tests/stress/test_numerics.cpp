@@ -92,9 +92,9 @@ TEST(Numerics, TriangleTestKeepsItsBounds) {
   EXPECT_GT(worst_depth, 0.05);
 }
 
-// Where a triangle is hit its box is, and the entry is not behind the hit by more than the hit's depth may err
-// (of a needle seen edge-on; five hits in a million): what the margin is for. The margin that would have been
-// needed, found by bisection on boxes shrunk by hand, stays below the one there is.
+// Where a triangle is hit its box is, and the entry is not behind the hit by more than the hit's depth may
+// err (of a needle seen edge-on; five hits in a million): what the margin is for. The margin that would have
+// been needed, found by bisection on boxes shrunk by hand, stays below the one there is.
 TEST(Numerics, BoxMarginIsEnough) {
   Random random(4);
   double most_needed = 0;
