@@ -53,6 +53,6 @@ lsp_variant(slab_flipped traverse.h
 lsp_variant(infinite_origin traverse.h
   "if (!lsp_all_finite(o) || !lsp_all_finite(d)) return false;" "")
 lsp_variant(cell_skipped ntree.h
-  "c.next.y = lsp_ntree_next(LSP_SCENE_ARG_ s, c.cell, ahead, c.size).y;"
-  "c.next.y = lsp_ntree_next(LSP_SCENE_ARG_ s, c.cell, ivec3(1) - ahead, c.size).y;")
+  "vec3 plane = lsp_ntree_lo(LSP_SCENE_ARG_ cell + ahead, size);"
+  "vec3 plane = lsp_ntree_lo(LSP_SCENE_ARG_ cell + ivec3(ahead.x, 1 - ahead.y, ahead.z), size);")
 file(CONFIGURE OUTPUT ${mutants_dir}/variants.inc CONTENT "${variants_inc}" @ONLY)
