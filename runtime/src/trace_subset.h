@@ -36,14 +36,11 @@ inline const T& at(const T* array, uint index, uint count) {
 }  // namespace lsp::subset
 
 #ifdef __SANITIZE_ADDRESS__
-#define LSP_FN [[maybe_unused]] static  // inlined and instrumented, sixteen loops take minutes to compile
+#define LSP_INLINE  // inlined and instrumented, sixteen loops take minutes to compile
+#define LSP_FN [[maybe_unused]] static
 #else
-#define LSP_FN static inline __attribute__((always_inline))
-#endif
-#ifdef __SANITIZE_ADDRESS__
-#define LSP_MEMBER
-#else
-#define LSP_MEMBER __attribute__((always_inline))
+#define LSP_INLINE __attribute__((always_inline))
+#define LSP_FN static inline LSP_INLINE
 #endif
 #define LSP_FN_RARE [[maybe_unused]] static __attribute__((noinline))
 #define LSP_SPLIT_FAR

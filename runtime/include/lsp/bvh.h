@@ -111,7 +111,7 @@ LSP_FN LspBest lsp_traverse(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod
     } else {
       LSP_COUNT_ADD(shafts, 1u);
       if ((flags & LSP_TRACE_NEAR_SKIP_BIT) != 0u && lsp_is_near(ref))
-        next = lsp_go_on_near(LSP_SCENE_ARG_ s, ref, LSP_LINE_SPACE(ref & LSP_STACK_INDEX_MASK).child);
+        next = lsp_go_on_near(LSP_SCENE_ARG_ s, ref);
       else
         lsp_look_up(LSP_SCENE_ARG_ s, ref & LSP_STACK_INDEX_MASK, best);
     }

@@ -210,7 +210,7 @@ LSP_FN LspBest lsp_traverse_cells(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, flo
   uint ref = lsp_ntree_root(LSP_SCENE_ARG_ s, flags, lod, c, t_last LSP_COUNTS_ARG);
   if ((flags & LSP_TRACE_NEAR_SKIP_BIT) != 0u && lsp_is_near(ref)) {
     LSP_COUNT_ADD(shafts, 1u);
-    ref = lsp_go_on_near(LSP_SCENE_ARG_ s, ref, LSP_HEADER.root);
+    ref = lsp_go_on_near(LSP_SCENE_ARG_ s, ref);
   }
   bool done = ref == LSP_NONE;
   if (!done && (ref & LSP_STACK_LINE_SPACE_BIT) != 0u) {
@@ -229,7 +229,7 @@ LSP_FN LspBest lsp_traverse_cells(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, flo
       ref = lsp_ntree_look(LSP_SCENE_ARG_ s, flags, lod, far, best.t, c, count LSP_COUNTS_ARG);
       if ((flags & LSP_TRACE_NEAR_SKIP_BIT) != 0u && lsp_is_near(ref)) {
         LSP_COUNT_ADD(shafts, 1u);
-        ref = lsp_go_on_near(LSP_SCENE_ARG_ s, ref, LSP_LINE_SPACE(ref & LSP_STACK_INDEX_MASK).child);
+        ref = lsp_go_on_near(LSP_SCENE_ARG_ s, ref);
       }
     }
     if (lsp_is_node(ref) && c.depth + 1u < LSP_MAX_NTREE_DEPTH) {

@@ -485,9 +485,10 @@ LSP_FN bool lsp_is_node(uint ref) { return (ref & (LSP_LEAF_BIT | LSP_STACK_LINE
 /* Whether a reference on the stack asks if the ray leaves a box freely; neither a leaf's nor LSP_NONE does. */
 LSP_FN bool lsp_is_near(uint ref) { return (ref >> 29u) == 3u; }
 
-/* Where to go on from such a reference, of the node `child`: LSP_NONE where the ray leaves freely. */
-LSP_FN uint lsp_go_on_near(LSP_SCENE_ LSP_IN(LspSetup) s, uint ref, uint child) {
-  return lsp_leaves_freely(LSP_SCENE_ARG_ s, ref & LSP_STACK_INDEX_MASK) ? LSP_NONE : child;
+/* Where to go on from such a reference: LSP_NONE where the ray leaves freely, else what the Line Space stands for. */
+LSP_FN uint lsp_go_on_near(LSP_SCENE_ LSP_IN(LspSetup) s, uint ref) {
+  uint index = ref & LSP_STACK_INDEX_MASK;
+  return lsp_leaves_freely(LSP_SCENE_ARG_ s, index) ? LSP_NONE : LSP_LINE_SPACE(index).child;
 }
 
 /* Whether rounding moves a ray by no more than conservative Line Spaces allow for (lsp/empty_margin.h). */
