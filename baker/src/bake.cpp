@@ -9,6 +9,7 @@
 
 #include "box.h"
 #include "lsp/program.h"
+#include "lsp/sections.h"
 #include "normals.h"
 #include "sites.h"
 
@@ -129,32 +130,25 @@ std::string with_commas(uint64_t n) {
 }
 
 lsp_scene view(const Baked& baked) {
+  const SectionArrays arrays{baked};
   lsp_scene scene{};
   scene.header = &baked.header;
-  scene.nodes = baked.nodes.data();
-  scene.grid = baked.ntree.grid.data();
-  scene.cells = baked.ntree.cells.data();
-  scene.references = baked.ntree.references.data();
-  scene.triangles = baked.triangles.data();
-  scene.line_spaces = baked.line_spaces.records.data();
-  scene.bit_words = baked.line_spaces.words.data();
-  scene.candidates = baked.line_spaces.candidates.data();
-  scene.normals = baked.normals.empty() ? nullptr : baked.normals.data();
+#define LSP_ARRAY_SECTION(Name, TYPE, code, Element, flag, base, feature, owed, member, ...) \
+  scene.member = arrays.member.size() == 0 ? nullptr : arrays.member.data();
+#include "lsp/sections.def"
   return scene;
 }
 
 void set_counts(Baked& baked) {
   LspHeader& h = baked.header;
-  h.node_count = h.base_structure == LSP_BASE_NTREE ? baked.ntree.node_count : uint32_t(baked.nodes.size());
-  h.cell_count = uint32_t(baked.ntree.cells.size());
-  h.reference_count = uint32_t(baked.ntree.references.size());
-  h.triangle_count = uint32_t(baked.triangles.size());
-  h.line_space_count = uint32_t(baked.line_spaces.records.size());
-  h.bit_word_count = uint32_t(baked.line_spaces.words.size());
-  h.candidate_word_count = uint32_t(baked.line_spaces.candidates.size());
-  h.material_count = uint32_t(baked.materials.size());
-  if (h.base_structure == LSP_BASE_NTREE)
-    h.max_steps = 3 * h.ntree_branching * h.node_count + h.cell_count + h.reference_count;
+  format::set_counters(h, SectionArrays{baked});
+  if (!format::is_ntree(h)) return;
+  const uint64_t steps = lsp_ntree_steps(&h);
+  if (steps > LSP_NONE)
+    throw Failure(Exit::kLimit, "",
+                  "the NTree needs " + with_commas(steps) +
+                      " steps of traversal, more than a file can state: lower --ntree-depth");
+  h.max_steps = uint32_t(steps);
 }
 
 Baked bake(const Mesh& mesh, const BakeOptions& asked, const Progress& progress) {

@@ -56,6 +56,21 @@ struct Baked {
   double line_space_seconds = 0;
 };
 
+// Where a bake has each section, by the names of lsp/sections.def.
+struct SectionArrays {
+  const Baked& baked;
+  const std::vector<LspNode>& nodes = baked.nodes;
+  const std::vector<LspTriangle>& triangles = baked.triangles;
+  const std::vector<LspCornerNormals>& normals = baked.normals;
+  const std::vector<LspMaterial>& materials = baked.materials;
+  const std::vector<LspLineSpace>& line_spaces = baked.line_spaces.records;
+  const LargeArray<LspBitWord>& bit_words = baked.line_spaces.words;
+  const LargeArray<uint32_t>& candidates = baked.line_spaces.candidates;
+  const std::vector<LspBitWord>& grid = baked.ntree.grid;
+  const std::vector<LspCell>& cells = baked.ntree.cells;
+  const std::vector<uint32_t>& references = baked.ntree.references;
+};
+
 // Called with the stage's name and the share of it done, from any thread.
 using Progress = std::function<void(std::string_view stage, double done)>;
 
@@ -70,7 +85,8 @@ void keep_approximate_only(Baked& baked);
 // The bake as a scene to trace; it points into `baked`.
 lsp_scene view(const Baked& baked);
 
-// Sets the header's counts, and what follows from them, to those of the sections.
+// Sets the header's counts, and what follows from them, to those of the sections. Throws Failure with
+// Exit::kLimit where the header has no room for what follows.
 void set_counts(Baked& baked);
 
 // A number for people: 1,234,567.

@@ -14,15 +14,13 @@
 #include <span>
 
 #include "lsp/program.h"
+#include "lsp/sections.h"
 
 namespace lsp {
 namespace {
 
 struct Section {
-  const char* name;
-  uint32_t type;
-  uint32_t element_bytes;
-  bool required;
+  const format::KindInfo& known;
   std::span<const std::byte> bytes;
   std::function<void()> release;  // after reading a piece of `bytes`; may be empty
   std::vector<std::byte> packed;
@@ -130,43 +128,35 @@ class TemporaryFile {
   uint64_t position_ = 0;
 };
 
+// All that are not empty; they point into `baked` and `meta`.
+std::vector<Section> sections_of(const Baked& baked, const std::string& meta) {
+  std::vector<Section> sections;
+  const SectionArrays arrays{baked};
+  const auto add = [&](format::Kind kind, const auto& elements) {
+    if (elements.size() == 0) return;
+    sections.push_back({info(kind), std::as_bytes(std::span(elements.data(), elements.size())), {}, {}});
+    if constexpr (requires { elements.release(); })
+      sections.back().release = [&elements] { elements.release(); };
+  };
+#define LSP_ARRAY_SECTION(Name, TYPE, code, Element, flag, base, feature, owed, member, ...) \
+  add(format::Kind::k##Name, arrays.member);
+#define LSP_BYTE_SECTION(Name, ...) add(format::Kind::k##Name, meta);
+#include "lsp/sections.def"
+  return sections;
+}
+
 }  // namespace
 
 Written write_lsp(const std::filesystem::path& path, Baked& baked, const std::string& meta,
                   const WriteOptions& options) {
-  std::vector<Section> sections;
-  const auto add = [&](const char* name, uint32_t type, uint32_t element_bytes, bool required,
-                       const void* data, size_t bytes) {
-    if (bytes == 0) return;
-    sections.push_back(
-        {name, type, element_bytes, required, {static_cast<const std::byte*>(data), bytes}, {}, {}});
-  };
-  const auto add_vector = [&](const char* name, uint32_t type, bool required, const auto& v) {
-    add(name, type, uint32_t(sizeof v[0]), required, v.data(), v.size() * sizeof v[0]);
-  };
-  add_vector("NODE", LSP_SECTION_NODE, true, baked.nodes);
-  add_vector("TRIA", LSP_SECTION_TRIA, true, baked.triangles);
-  add_vector("NRML", LSP_SECTION_NRML, true, baked.normals);
-  add_vector("MATL", LSP_SECTION_MATL, true, baked.materials);
-  add_vector("LSPC", LSP_SECTION_LSPC, true, baked.line_spaces.records);
-  const auto add_large = [&](const char* name, uint32_t type, const auto& v) {
-    add_vector(name, type, true, v);
-    if (!v.empty()) sections.back().release = [&v] { v.release(); };
-  };
-  add_large("BITS", LSP_SECTION_BITS, baked.line_spaces.words);
-  add_large("CAND", LSP_SECTION_CAND, baked.line_spaces.candidates);
-  add_vector("GRID", LSP_SECTION_GRID, true, baked.ntree.grid);
-  add_vector("CELL", LSP_SECTION_CELL, true, baked.ntree.cells);
-  add_vector("REFS", LSP_SECTION_REFS, true, baked.ntree.references);
-  add("META", LSP_SECTION_META, 1, false, meta.data(), meta.size());
-
+  std::vector<Section> sections = sections_of(baked, meta);
   bool any_packed = false;
   if (options.zstd)
     for (Section& s : sections) {
       if (options.memory_limit && s.bytes.size() > options.memory_limit / 2)
         throw Failure(
             Exit::kLimit, "",
-            std::string("packing section ") + s.name + " of " + std::to_string(s.bytes.size() >> 20) +
+            std::string("packing section ") + s.known.name + " of " + std::to_string(s.bytes.size() >> 20) +
                 " MiB needs more memory than --memory-limit leaves: raise it, or leave out --compress");
       s.packed = compress(s.bytes, options.zstd_level);
       if (s.packed.size() >= s.bytes.size()) s.packed.clear();
@@ -190,12 +180,14 @@ Written write_lsp(const std::filesystem::path& path, Baked& baked, const std::st
   uint64_t position = sizeof(LspHeader) + sections.size() * sizeof(LspSection);
   for (const Section& s : sections) {
     const XXH128_hash_t hash = hash_of(s);
-    const uint64_t count = s.bytes.size() / s.element_bytes;
+    const format::KindInfo& known = s.known;
+    const uint64_t count = s.bytes.size() / known.element_bytes;
+    const uint32_t flags = known.flag == format::SectionFlag::kOptional ? 0 : LSP_SECTION_REQUIRED;
     position = align_up(position, alignment);
-    table.push_back({s.type, s.required ? LSP_SECTION_REQUIRED : 0u, position, s.stored().size(),
-                     s.bytes.size(), s.packed.empty() ? LSP_CODEC_NONE : LSP_CODEC_ZSTD, s.element_bytes,
-                     count, hash.low64, hash.high64});
-    content.push_back({s.type, s.element_bytes, count, s.bytes.size(), hash.low64, hash.high64});
+    table.push_back({known.type, flags, position, s.stored().size(), s.bytes.size(),
+                     s.packed.empty() ? LSP_CODEC_NONE : LSP_CODEC_ZSTD, known.element_bytes, count,
+                     hash.low64, hash.high64});
+    content.push_back({known.type, known.element_bytes, count, s.bytes.size(), hash.low64, hash.high64});
     position += s.stored().size();
   }
   h.file_bytes = align_up(position, alignment);
@@ -218,7 +210,8 @@ Written write_lsp(const std::filesystem::path& path, Baked& baked, const std::st
     file.pad_to(table[i].offset);
     for_each_piece(sections[i].stored(), sections[i].release,
                    [&](std::span<const std::byte> piece) { file.write(piece.data(), piece.size()); });
-    written.sections.push_back({sections[i].name, sections[i].bytes.size(), sections[i].stored().size()});
+    written.sections.push_back(
+        {sections[i].known.name, sections[i].bytes.size(), sections[i].stored().size()});
   }
   file.pad_to(h.file_bytes);
   file.commit();

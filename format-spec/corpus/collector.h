@@ -36,7 +36,7 @@ class Collector {
   // A scene with conservative Line Spaces of one word, less the bit of a shaft: all else is as it was.
   void empty_shaft(Image image, const char* mutation) {
     LspLineSpace& space = image.line_spaces[0];
-    image.words[space.word_first].bits &= ~1u;
+    image.bit_words[space.word_first].bits &= ~1u;
     space.filled -= 1;
     add(format::RuleId::kShaftNotEmpty, mutation, encode(image), {"--level", "geometry"});
   }

@@ -15,11 +15,6 @@ namespace {
 using format::align_up;
 using format::in_range;
 
-template <class T>
-std::span<const std::byte> as_bytes_of(const std::vector<T>& elements) {
-  return std::as_bytes(std::span(elements));
-}
-
 }  // namespace
 
 Section make_section(uint32_t type, uint32_t flags, uint32_t element_bytes, std::span<const std::byte> data) {
@@ -39,32 +34,18 @@ Sections to_sections(const Image& image) {
   result.header = image.header;
   LspHeader& header = result.header;
   header.alignment = image.alignment;
-  header.node_count = static_cast<uint32_t>(image.nodes.size());
-  if (header.base_structure == LSP_BASE_NTREE)
-    header.node_count = static_cast<uint32_t>(image.grid.size() / LSP_GRID_WORDS(header.ntree_branching));
-  header.cell_count = static_cast<uint32_t>(image.cells.size());
-  header.reference_count = static_cast<uint32_t>(image.references.size());
-  header.triangle_count = static_cast<uint32_t>(image.triangles.size());
-  header.material_count = static_cast<uint32_t>(image.materials.size());
-  header.line_space_count = static_cast<uint32_t>(image.line_spaces.size());
-  header.bit_word_count = static_cast<uint32_t>(image.words.size());
-  header.candidate_word_count = static_cast<uint32_t>(image.candidates.size());
-  const auto add = [&](uint32_t type, uint32_t flags, uint32_t element_bytes,
-                       std::span<const std::byte> data) {
-    if (!data.empty()) result.sections.push_back(make_section(type, flags, element_bytes, data));
+  format::set_counters(header, image);
+  const auto add = [&](format::Kind kind, const auto& elements) {
+    const format::KindInfo& known = format::info(kind);
+    const uint32_t flags = known.flag == format::SectionFlag::kOptional ? 0 : LSP_SECTION_REQUIRED;
+    if (elements.empty()) return;
+    result.sections.push_back(
+        make_section(known.type, flags, known.element_bytes, std::as_bytes(std::span(elements))));
   };
-  constexpr uint32_t kRequired = LSP_SECTION_REQUIRED;
-  add(LSP_SECTION_NODE, kRequired, sizeof(LspNode), as_bytes_of(image.nodes));
-  add(LSP_SECTION_TRIA, kRequired, sizeof(LspTriangle), as_bytes_of(image.triangles));
-  add(LSP_SECTION_NRML, kRequired, sizeof(LspCornerNormals), as_bytes_of(image.normals));
-  add(LSP_SECTION_MATL, kRequired, sizeof(LspMaterial), as_bytes_of(image.materials));
-  add(LSP_SECTION_LSPC, kRequired, sizeof(LspLineSpace), as_bytes_of(image.line_spaces));
-  add(LSP_SECTION_BITS, kRequired, sizeof(LspBitWord), as_bytes_of(image.words));
-  add(LSP_SECTION_CAND, kRequired, sizeof(uint32_t), as_bytes_of(image.candidates));
-  add(LSP_SECTION_GRID, kRequired, sizeof(LspBitWord), as_bytes_of(image.grid));
-  add(LSP_SECTION_CELL, kRequired, sizeof(LspCell), as_bytes_of(image.cells));
-  add(LSP_SECTION_REFS, kRequired, sizeof(uint32_t), as_bytes_of(image.references));
-  add(LSP_SECTION_META, 0, 1, std::as_bytes(std::span(image.meta)));
+#define LSP_ARRAY_SECTION(Name, TYPE, code, Element, flag, base, feature, owed, member, ...) \
+  add(format::Kind::k##Name, image.member);
+#define LSP_BYTE_SECTION(Name, ...) add(format::Kind::k##Name, image.meta);
+#include <lsp/sections.def>
   return result;
 }
 

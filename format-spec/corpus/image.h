@@ -5,7 +5,7 @@
 // rules it is meant for.
 #pragma once
 
-#include <lsp/layout.h>
+#include <lsp/sections.h>
 
 #include <cstddef>
 #include <cstdint>
@@ -19,16 +19,9 @@ using Bytes = std::vector<std::byte>;
 
 struct Image {
   LspHeader header{};  // counts, sizes, offsets and hashes are filled in later
-  std::vector<LspNode> nodes;
-  std::vector<LspTriangle> triangles;
-  std::vector<LspCornerNormals> normals;
-  std::vector<LspMaterial> materials;
-  std::vector<LspLineSpace> line_spaces;
-  std::vector<LspBitWord> words;
-  std::vector<uint32_t> candidates;
-  std::vector<LspBitWord> grid;  // of an NTree, in place of nodes
-  std::vector<LspCell> cells;
-  std::vector<uint32_t> references;
+#define LSP_ARRAY_SECTION(Name, TYPE, code, Element, flag, base, feature, owed, member, ...) \
+  std::vector<Element> member;
+#include <lsp/sections.def>
   std::string meta;
   uint32_t alignment = 256;
 };

@@ -139,7 +139,7 @@ void LineSpaceTables::pack(Image& image) const {
     LspLineSpace& space = image.line_spaces[i];
     const format::LineSpaceShape shape = format::shape_of(space.format);
     const std::vector<uint32_t>& shafts = tables_[i];
-    space.word_first = shape.words == 0 ? 0 : static_cast<uint32_t>(image.words.size());
+    space.word_first = shape.words == 0 ? 0 : static_cast<uint32_t>(image.bit_words.size());
     const uint64_t candidate_words = shape.candidate_words(space.filled);
     space.candidate_first = candidate_words == 0 ? 0 : static_cast<uint32_t>(image.candidates.size());
     image.candidates.resize(image.candidates.size() + candidate_words);
@@ -149,7 +149,7 @@ void LineSpaceTables::pack(Image& image) const {
       for (uint64_t bit = 0; bit < 32 && first + bit < shafts.size(); ++bit)
         if (shafts[first + bit] != LSP_NONE) word.bits |= 1u << bit;
       filled += static_cast<uint32_t>(std::popcount(word.bits));
-      image.words.push_back(word);
+      image.bit_words.push_back(word);
     }
     if (shape.entry_bytes == 0) continue;
     auto* entries = reinterpret_cast<unsigned char*>(image.candidates.data() + space.candidate_first);

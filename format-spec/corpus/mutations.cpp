@@ -257,17 +257,17 @@ void bits_and_candidates(Collector& c) {
           [](Image& i) { i.line_spaces[1].word_first = 0; });
   c.image(RuleId::kWordsOutside, "word_first of the last Line Space is 2^32 - 1",
           [](Image& i) { i.line_spaces.back().word_first = 0xFFFFFFFFu; });
-  c.image(RuleId::kOffsetWrong, "the offset of bit word 0 is 1", [](Image& i) { i.words[0].offset = 1; });
+  c.image(RuleId::kOffsetWrong, "the offset of bit word 0 is 1", [](Image& i) { i.bit_words[0].offset = 1; });
   c.image(RuleId::kTailBits, "bit 31 of bit word 0 is set, beyond 30 shafts",
-          [](Image& i) { i.words[0].bits |= 0x80000000u; });
+          [](Image& i) { i.bit_words[0].bits |= 0x80000000u; });
   c.image(RuleId::kFilledWrong, "filled of Line Space 0 is one less",
           [](Image& i) { i.line_spaces[0].filled -= 1; });
-  c.image(RuleId::kWordsUnused, "BITS has one word more", [](Image& i) { i.words.push_back({0, 0}); });
+  c.image(RuleId::kWordsUnused, "BITS has one word more", [](Image& i) { i.bit_words.push_back({0, 0}); });
   c.image(RuleId::kLineSpaceEmpty, "the last Line Space has no filled shaft", [](Image& i) {
     i.candidates.resize(i.line_spaces.back().candidate_first);
     i.line_spaces.back().candidate_first = 0;
     i.line_spaces.back().filled = 0;
-    i.words.back() = {0, 0};
+    i.bit_words.back() = {0, 0};
   });
   c.image(RuleId::kEntriesNotCumulative, "candidate_first of Line Space 1 is 0",
           [](Image& i) { i.line_spaces[1].candidate_first = 0; });

@@ -53,7 +53,7 @@ void nodes(Collector& c) {
     i.references.resize(i.references.size() - i.cells.back().count);
     i.cells.pop_back();
     i.line_spaces.pop_back();
-    i.words.pop_back();
+    i.bit_words.pop_back();
     i.candidates.resize(i.line_spaces.back().candidate_first + (i.line_spaces.back().filled + 3) / 4);
     i.header.max_steps = 3 * 2 * 9 + static_cast<uint32_t>(i.cells.size() + i.references.size());
   });

@@ -217,10 +217,9 @@ class Builder {
     else
       for (LspTriangle& t : image_.triangles) t.material = 0;
     LspHeader& h = image_.header;
-    const uint32_t nodes = static_cast<uint32_t>(image_.grid.size()) / LSP_GRID_WORDS(options_.branching);
     h.max_depth = h.max_stack = options_.levels;
-    h.max_steps = 3 * options_.branching * nodes +
-                  static_cast<uint32_t>(image_.cells.size() + image_.references.size());
+    lsp::format::set_counters(h, image_);
+    h.max_steps = static_cast<uint32_t>(lsp_ntree_steps(&h));
     h.required_features = LSP_FEATURE_NTREE | (options_.exact ? LSP_FEATURE_EXACT : 0) |
                           (image_.line_spaces.empty() ? 0 : LSP_FEATURE_LINE_SPACES) |
                           (options_.normals ? LSP_FEATURE_NORMALS : 0) |

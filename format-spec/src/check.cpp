@@ -40,6 +40,17 @@ bool usable_or_absent(const FileView& view, Kind kind) {
   return part.usable || (!part.present && declared_count(view.header, kind).value_or(0) == 0);
 }
 
+// Whether the triangles and every section of the base structure are.
+bool tree_usable(const FileView& view) {
+  bool usable = usable_or_absent(view, Kind::kTria);
+  for (int kind = 0; kind < kKinds; ++kind) {
+    const uint32_t base = info(static_cast<Kind>(kind)).base;
+    if (base != 0 && holds_base(view.header, base))
+      usable = usable && usable_or_absent(view, static_cast<Kind>(kind));
+  }
+  return usable;
+}
+
 }  // namespace
 
 Report check_file(std::span<const std::byte> bytes, const CheckOptions& options) {
@@ -57,12 +68,7 @@ Report check_file(std::span<const std::byte> bytes, const CheckOptions& options)
   if (options.level < Level::kStructure) return report;
 
   const bool ntree = is_ntree(view.header);
-  bool tree = usable_or_absent(view, Kind::kTria);
-  if (ntree)
-    tree = tree && ntree_readable(view.header) && usable_or_absent(view, Kind::kGrid) &&
-           usable_or_absent(view, Kind::kCell) && usable_or_absent(view, Kind::kRefs);
-  else
-    tree = tree && usable_or_absent(view, Kind::kNode);
+  const bool tree = (!ntree || ntree_readable(view.header)) && tree_usable(view);
   if (tree) ntree ? check_ntree(view, report) : check_tree(view, report);
   if (view.part(Kind::kLspc).usable) check_line_spaces(view, report);
   if (options.level < Level::kGeometry) return report;

@@ -50,9 +50,11 @@ void check_features(const LspHeader& header, const FileView& view, Report& repor
             (present ? " is present but its feature bit " : " is missing but its feature bit ") + hex(bit) +
             (present ? " is clear" : " is set"));
   };
-  expect(LSP_FEATURE_NORMALS, has(LSP_SECTION_NRML), header.triangle_count, "NRML");
-  expect(LSP_FEATURE_MATERIALS, has(LSP_SECTION_MATL), header.material_count, "MATL");
-  expect(LSP_FEATURE_LINE_SPACES, has(LSP_SECTION_LSPC), header.line_space_count, "LSPC");
+  for (int kind = 0; kind < kKinds; ++kind) {
+    const KindInfo& known = info(static_cast<Kind>(kind));
+    if (known.feature != 0)
+      expect(known.feature, has(known.type), *header_count(header, static_cast<Kind>(kind)), known.name);
+  }
   if ((features & (LSP_FEATURE_EXACT | LSP_FEATURE_LINE_SPACES)) == 0)
     LSP_HEADER_FINDING(kNothingToTrace, required_features,
                        "neither EXACT nor LINE_SPACES is set: no ray can be traced");
@@ -124,7 +126,7 @@ void check_limits(const LspHeader& header, Report& report) {
   if (header.max_depth > LSP_MAX_STACK)
     LSP_HEADER_FINDING(kDepthBound, max_depth,
                        "is " + std::to_string(header.max_depth) + ", the limit is 96");
-  const uint64_t steps = is_ntree(header) ? ntree_steps(header) : 2 * uint64_t{header.node_count};
+  const uint64_t steps = is_ntree(header) ? lsp_ntree_steps(&header) : 2 * uint64_t{header.node_count};
   if (header.max_steps > steps + kStepsSlack)
     LSP_HEADER_FINDING(
         kStepsBound, max_steps,

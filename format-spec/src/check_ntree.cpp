@@ -405,7 +405,7 @@ class NtreeCheck {
     bound(RuleId::kStackExceeded, offsetof(LspHeader, max_stack), "max_stack", header_.max_stack, height,
           "a traversal may need");
     bound(RuleId::kStepsExceeded, offsetof(LspHeader, max_steps), "max_steps", header_.max_steps,
-          ntree_steps(header_), "a traversal may take");
+          lsp_ntree_steps(&header_), "a traversal may take");
   }
 
   void check_unused() {

@@ -70,18 +70,15 @@ class TableCheck {
     const bool required = section.flags & LSP_SECTION_REQUIRED;
     bool wrong = (section.flags & ~LSP_SECTION_REQUIRED) != 0;
     if (kind != kKinds) {
-      const KindInfo& expected = info(static_cast<Kind>(kind));
-      wrong = wrong || (expected.required && !required) || (expected.optional && required);
+      const SectionFlag expected = info(static_cast<Kind>(kind)).flag;
+      wrong = wrong || (required ? expected == SectionFlag::kOptional : expected == SectionFlag::kRequired);
     }
     if (wrong) LSP_TABLE_FINDING(kSectionFlags, i, flags, "flags are " + std::to_string(section.flags));
   }
 
   // The tree of one base structure in the file of the other.
   void base(uint64_t i, int kind) {
-    if (kind == kKinds) return;
-    const Kind known = static_cast<Kind>(kind);
-    const bool cells = known == Kind::kGrid || known == Kind::kCell || known == Kind::kRefs;
-    if (is_ntree(view_.header) ? known == Kind::kNode : cells)
+    if (kind != kKinds && !holds_base(view_.header, info(static_cast<Kind>(kind)).base))
       LSP_TABLE_FINDING(kOtherBase, i, type,
                         is_ntree(view_.header) ? "the file holds an NTree" : "the file holds no NTree");
   }
@@ -189,12 +186,12 @@ class TableCheck {
         return kind_of(section.type) == kind;
       });
       if (entry == view_.table.end()) {
-        // Whether NRML is owed is a matter of the feature bits.
-        if (*declared != 0 && static_cast<Kind>(kind) != Kind::kNrml)
-          report_.add(
-              RuleId::kMissingSection, sizeof(LspHeader), view_.table.size() * sizeof(LspSection), "/table",
-              std::string(info(static_cast<Kind>(kind)).name) + " is missing, but the header counts " +
-                  std::to_string(*declared) + " of its elements");
+        const KindInfo& missing = info(static_cast<Kind>(kind));
+        if (*declared != 0 && missing.owed == Owed::kByCount)  // of the others rule 217 speaks
+          report_.add(RuleId::kMissingSection, sizeof(LspHeader), view_.table.size() * sizeof(LspSection),
+                      "/table",
+                      std::string(missing.name) + " is missing, but the header counts " +
+                          std::to_string(*declared) + " of its elements");
       } else if (entry->element_count != *declared) {
         LSP_TABLE_FINDING(kCountDiffers, entry - view_.table.begin(), element_count,
                           "is " + std::to_string(entry->element_count) + ", but the header says " +

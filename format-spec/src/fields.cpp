@@ -251,36 +251,23 @@ uint32_t Field::count() const {
 
 std::span<const Struct> structs() { return kStructs; }
 
-const Struct& struct_named(const char* name) {
+namespace {
+
+const Struct* find_struct(std::string_view name) {
   for (const Struct& candidate : kStructs)
-    if (std::string_view(candidate.name) == name) return candidate;
+    if (candidate.name == name) return &candidate;
+  return nullptr;
+}
+
+}  // namespace
+
+const Struct& struct_named(const char* name) {
+  if (const Struct* found = find_struct(name)) return *found;
   throw std::logic_error("no such struct");
 }
 
-const Struct* element_struct(Kind kind) {
-  switch (kind) {
-    case Kind::kNode:
-      return &struct_named("LspNode");
-    case Kind::kTria:
-      return &struct_named("LspTriangle");
-    case Kind::kNrml:
-      return &struct_named("LspCornerNormals");
-    case Kind::kMatl:
-      return &struct_named("LspMaterial");
-    case Kind::kLspc:
-      return &struct_named("LspLineSpace");
-    case Kind::kCell:
-      return &struct_named("LspCell");
-    case Kind::kBits:
-    case Kind::kGrid:
-      return &struct_named("LspBitWord");
-    case Kind::kCand:
-    case Kind::kRefs:
-    case Kind::kMeta:
-      break;
-  }
-  return nullptr;
-}
+const Struct* element_struct(Kind kind) { return find_struct(info(kind).element); }
+bool is_words(Kind kind) { return std::string_view(info(kind).element) == "uint32_t"; }
 
 std::string value_text(const Field& field, const std::byte* bytes, bool ntree) {
   std::string text;

@@ -31,9 +31,9 @@ struct Struct {
 std::span<const Struct> structs();
 const Struct& struct_named(const char* name);
 
-// The struct of a section's element; null for CAND and REFS, whose elements are words, and META's characters.
+// The struct of a section's element; null where elements are words or characters.
 const Struct* element_struct(Kind kind);
-inline bool is_words(Kind kind) { return kind == Kind::kCand || kind == Kind::kRefs; }
+bool is_words(Kind kind);
 
 // The field's value in a struct at `bytes`: "12", "0x80000003", "(0, 1, 2.5)". References, formats and types
 // are given with their meaning, child references with that of the tree.

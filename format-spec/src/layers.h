@@ -40,13 +40,6 @@ inline bool finite(const lsp_float3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
-// Steps of a traversal of an NTree at most: of every node the cells along a line and the way out of it, or
-// all filled cells, and every reference.
-inline uint64_t ntree_steps(const LspHeader& header) {
-  return uint64_t{3} * header.ntree_branching * header.node_count + header.cell_count +
-         header.reference_count;
-}
-
 // "/sections/NODE/12/child1"
 inline std::string element_path(Kind kind, uint64_t index, const char* field = nullptr) {
   std::string path = std::string("/sections/") + info(kind).name + "/" + std::to_string(index);

@@ -5,66 +5,14 @@
 #include <cstring>
 
 namespace lsp::format {
-namespace {
-
-constexpr KindInfo kInfos[kKinds] = {
-    {LSP_SECTION_NODE, "NODE", sizeof(LspNode), true, false},
-    {LSP_SECTION_TRIA, "TRIA", sizeof(LspTriangle), true, false},
-    {LSP_SECTION_NRML, "NRML", sizeof(LspCornerNormals), false, false},
-    {LSP_SECTION_MATL, "MATL", sizeof(LspMaterial), false, false},
-    {LSP_SECTION_LSPC, "LSPC", sizeof(LspLineSpace), true, false},
-    {LSP_SECTION_BITS, "BITS", sizeof(LspBitWord), true, false},
-    {LSP_SECTION_CAND, "CAND", sizeof(uint32_t), true, false},
-    {LSP_SECTION_GRID, "GRID", sizeof(LspBitWord), true, false},
-    {LSP_SECTION_CELL, "CELL", sizeof(LspCell), true, false},
-    {LSP_SECTION_REFS, "REFS", sizeof(uint32_t), true, false},
-    {LSP_SECTION_META, "META", 1, false, true},
-};
-
-}  // namespace
-
-const KindInfo& info(Kind kind) { return kInfos[static_cast<int>(kind)]; }
-
-int kind_of(uint32_t type) {
-  for (int kind = 0; kind < kKinds; ++kind)
-    if (kInfos[kind].type == type) return kind;
-  return kKinds;
-}
-
-bool is_ntree(const LspHeader& header) { return header.base_structure == LSP_BASE_NTREE; }
-
 bool ntree_readable(const LspHeader& header) {
   return is_ntree(header) && header.ntree_branching >= 2 && header.ntree_branching <= LSP_MAX_BRANCHING &&
          header.ntree_depth >= 1 && header.ntree_depth <= LSP_MAX_NTREE_DEPTH;
 }
 
 std::optional<uint64_t> declared_count(const LspHeader& header, Kind kind) {
-  switch (kind) {
-    case Kind::kNode:
-      return is_ntree(header) ? 0 : header.node_count;
-    case Kind::kTria:
-    case Kind::kNrml:
-      return header.triangle_count;
-    case Kind::kMatl:
-      return header.material_count;
-    case Kind::kLspc:
-      return header.line_space_count;
-    case Kind::kBits:
-      return header.bit_word_count;
-    case Kind::kCand:
-      return header.candidate_word_count;
-    case Kind::kGrid:
-      if (!is_ntree(header)) return 0;
-      if (!ntree_readable(header)) break;
-      return uint64_t{header.node_count} * LSP_GRID_WORDS(header.ntree_branching);
-    case Kind::kCell:
-      return header.cell_count;
-    case Kind::kRefs:
-      return header.reference_count;
-    case Kind::kMeta:
-      break;
-  }
-  return std::nullopt;
+  if (kind == Kind::kGrid && is_ntree(header) && !ntree_readable(header)) return std::nullopt;
+  return header_count(header, kind);
 }
 
 std::string type_name(uint32_t type) {

@@ -1,7 +1,7 @@
 // A lenient view of a file that may be damaged: what of it can be read, and where each part lies.
 #pragma once
 
-#include <lsp/layout.h>
+#include <lsp/sections.h>
 
 #include <array>
 #include <cstddef>
@@ -14,24 +14,7 @@
 
 namespace lsp::format {
 
-// The section types of version 1.0 in the order of the file.
-enum class Kind { kNode, kTria, kNrml, kMatl, kLspc, kBits, kCand, kGrid, kCell, kRefs, kMeta };
-inline constexpr int kKinds = 11;
-
-struct KindInfo {
-  uint32_t type;  // LSP_SECTION_*
-  const char* name;
-  uint32_t element_bytes;
-  bool required;  // LSP_SECTION_REQUIRED is set; NRML and MATL may be either
-  bool optional;  // LSP_SECTION_REQUIRED is clear
-};
-const KindInfo& info(Kind kind);
-
-// The kind of a section type; kKinds for one that this version does not define.
-int kind_of(uint32_t type);
-
-// Whether the header says that the tree is an NTree, and with parameters in range: GRID can be read.
-bool is_ntree(const LspHeader& header);
+// Whether the header says that the tree is an NTree with parameters in range: GRID can be read.
 bool ntree_readable(const LspHeader& header);
 
 // How many elements the header says that a section has; nothing for META, and for GRID where the header's

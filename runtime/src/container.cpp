@@ -12,24 +12,9 @@ static_assert(std::endian::native == std::endian::little);
 namespace lsp {
 namespace {
 
-// What the format says about the sections of this version.
-struct KnownType {
-  uint32_t type;
-  uint32_t element_bytes;
-};
-constexpr KnownType kKnown[kKnownSectionCount] = {
-    {LSP_SECTION_NODE, sizeof(LspNode)},
-    {LSP_SECTION_TRIA, sizeof(LspTriangle)},
-    {LSP_SECTION_NRML, sizeof(LspCornerNormals)},
-    {LSP_SECTION_MATL, sizeof(LspMaterial)},
-    {LSP_SECTION_LSPC, sizeof(LspLineSpace)},
-    {LSP_SECTION_BITS, sizeof(LspBitWord)},
-    {LSP_SECTION_CAND, sizeof(uint32_t)},
-    {LSP_SECTION_GRID, sizeof(LspBitWord)},
-    {LSP_SECTION_CELL, sizeof(LspCell)},
-    {LSP_SECTION_REFS, sizeof(uint32_t)},
-    {LSP_SECTION_META, 1},
-};
+using format::is_ntree;
+using format::Kind;
+using format::kKinds;
 
 constexpr uint64_t kPackedAlignment = 256;
 constexpr uint32_t kMaxAlignment = 65536;
@@ -37,21 +22,6 @@ constexpr uint64_t kStepsSlack = 16;
 // A traversal marks references to nodes in their two highest bits, to Line Spaces in three.
 constexpr uint32_t kMaxNodes = 1u << 30;
 constexpr uint32_t kMaxLineSpaces = 1u << 29;
-
-int known_index(uint32_t type) {
-  for (int i = 0; i < kKnownSectionCount; ++i) {
-    if (kKnown[i].type == type) return i;
-  }
-  return -1;
-}
-
-bool is_ntree(const LspHeader& header) { return header.base_structure == LSP_BASE_NTREE; }
-
-// What a traversal of an NTree visits at most: of every node the cells along a line and the way out of it, or
-// all filled cells (lsp/ntree.h), and every reference.
-uint64_t ntree_steps(const LspHeader& header) {
-  return 3ull * header.ntree_branching * header.node_count + header.cell_count + header.reference_count;
-}
 
 bool finite(const lsp_float3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
@@ -115,7 +85,7 @@ lsp_status check_limits(const LspHeader& header, lsp_error* error) {
   if (const lsp_status status = check_ntree(header, error); status != LSP_OK) return status;
   // Every node and leaf is visited once at most, so a loop bounded by this ends soon even where nodes form a
   // ring.
-  const uint64_t steps = is_ntree(header) ? ntree_steps(header) : 2 * uint64_t{header.node_count};
+  const uint64_t steps = is_ntree(header) ? lsp_ntree_steps(&header) : 2 * uint64_t{header.node_count};
   if (header.max_steps > steps + kStepsSlack) {
     return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, max_steps),
                 "states %u steps of traversal, more than its %u nodes allow", header.max_steps,
@@ -160,8 +130,8 @@ lsp_status check_root(const LspHeader& header, lsp_error* error) {
 lsp_status check_section(const LspHeader& header, const LspSection& section, uint64_t table_end, uint64_t at,
                          lsp_error* error) {
   const SectionName name(section.type);
-  const int known = known_index(section.type);
-  if (known < 0 && (section.flags & LSP_SECTION_REQUIRED) != 0) {
+  const int kind = format::kind_of(section.type);
+  if (kind == kKinds && (section.flags & LSP_SECTION_REQUIRED) != 0) {
     return fail(error, LSP_ERROR_UNSUPPORTED, at,
                 "needs section \"%s\" (0x%08X), which this library does not know; update the library",
                 name.text, section.type);
@@ -179,10 +149,11 @@ lsp_status check_section(const LspHeader& header, const LspSection& section, uin
     return fail(error, LSP_ERROR_INVALID, at, "section %s: its elements do not add up to its size",
                 name.text);
   }
-  if (known < 0) return LSP_OK;
-  if (section.element_bytes != kKnown[known].element_bytes) {
+  if (kind == kKinds) return LSP_OK;
+  const format::KindInfo& known = info(static_cast<Kind>(kind));
+  if (section.element_bytes != known.element_bytes) {
     return fail(error, LSP_ERROR_INVALID, at, "section %s has elements of %u bytes, not %u", name.text,
-                section.element_bytes, kKnown[known].element_bytes);
+                section.element_bytes, known.element_bytes);
   }
   if (section.codec != LSP_CODEC_NONE && section.codec != LSP_CODEC_ZSTD) {
     return fail(error, LSP_ERROR_UNSUPPORTED, at, "section %s is packed with codec %u, which is not known",
@@ -225,35 +196,22 @@ lsp_status check_table(const LspHeader& header, const LspSection* sections, bool
 lsp_status check_contents(const Container& container, lsp_error* error) {
   const LspHeader& header = *container.header;
   const uint32_t features = header.required_features;
-  const struct {
-    KnownSection section;
-    uint64_t count;
-    uint32_t feature;  // the bit that stands for the section, 0: none
-  } expected[] = {
-      {kNode, is_ntree(header) ? 0 : header.node_count, 0},
-      {kGrid, is_ntree(header) ? uint64_t{header.node_count} * LSP_GRID_WORDS(header.ntree_branching) : 0,
-       LSP_FEATURE_NTREE},
-      {kCell, header.cell_count, LSP_FEATURE_NTREE},
-      {kRefs, header.reference_count, LSP_FEATURE_NTREE},
-      {kTria, header.triangle_count, 0},
-      {kNrml, (features & LSP_FEATURE_NORMALS) != 0 ? header.triangle_count : 0, LSP_FEATURE_NORMALS},
-      {kMatl, header.material_count, LSP_FEATURE_MATERIALS},
-      {kLspc, header.line_space_count, LSP_FEATURE_LINE_SPACES},
-      {kBits, header.bit_word_count, 0},
-      {kCand, header.candidate_word_count, 0},
-  };
-  for (const auto& e : expected) {
-    const LspSection* section = container.known[e.section];
-    const SectionName name(kKnown[e.section].type);
+  for (int kind = 0; kind < kKinds; ++kind) {
+    const format::KindInfo& known = info(static_cast<Kind>(kind));
+    const bool has_feature = (features & known.feature) != 0;
+    uint64_t count = header_count(header, static_cast<Kind>(kind)).value_or(0);
+    if (known.owed == format::Owed::kNever) continue;
+    if (known.owed == format::Owed::kByFeature && !has_feature) count = 0;
+    const LspSection* section = container.known[kind];
     const uint64_t present = section == nullptr ? 0 : section->element_count;
-    if (present != e.count) {
+    if (present != count) {
       return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, node_count),
-                  "section %s has %llu elements, the header states %llu", name.text,
-                  static_cast<unsigned long long>(present), static_cast<unsigned long long>(e.count));
+                  "section %s has %llu elements, the header states %llu", known.name,
+                  static_cast<unsigned long long>(present), static_cast<unsigned long long>(count));
     }
-    if (e.feature != 0 && e.count != 0 && (features & e.feature) == 0) {
+    if (known.feature != 0 && count != 0 && !has_feature) {
       return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, required_features),
-                  "has section %s, but not the feature bit for it", name.text);
+                  "has section %s, but not the feature bit for it", known.name);
     }
   }
   return LSP_OK;
@@ -301,20 +259,20 @@ lsp_status read_container(const void* bytes, uint64_t size, Container* container
   const auto* sections = reinterpret_cast<const LspSection*>(static_cast<const unsigned char*>(bytes) +
                                                              header.section_table_offset);
   bool packed = false;
-  const LspSection* known[kKnownSectionCount] = {};
+  const LspSection* known[kKinds] = {};
   for (uint32_t i = 0; i < header.section_count; ++i) {
     const uint64_t at = header.section_table_offset + uint64_t{i} * sizeof(LspSection);
     const lsp_status status =
         check_section(header, sections[i], header.section_table_offset + table_bytes, at, error);
     if (status != LSP_OK) return status;
     packed = packed || sections[i].codec != LSP_CODEC_NONE;
-    if (const int index = known_index(sections[i].type); index >= 0) known[index] = &sections[i];
+    if (const int kind = format::kind_of(sections[i].type); kind != kKinds) known[kind] = &sections[i];
   }
   if (const lsp_status status = check_table(header, sections, packed, error); status != LSP_OK) return status;
 
   container->header = &header;
   container->sections = sections;
-  for (int i = 0; i < kKnownSectionCount; ++i) container->known[i] = known[i];
+  for (int i = 0; i < kKinds; ++i) container->known[i] = known[i];
   container->packed = packed;
   if (const lsp_status status = check_contents(*container, error); status != LSP_OK) return status;
   return check_root(header, error);

@@ -2,18 +2,16 @@
 #pragma once
 
 #include "lsp/lsp.h"
+#include "lsp/sections.h"
 
 namespace lsp {
-
-// The sections this version knows, in the order of the file.
-enum KnownSection { kNode, kTria, kNrml, kMatl, kLspc, kBits, kCand, kGrid, kCell, kRefs, kMeta, kKnownSectionCount };
 
 // A checked view of header and section table; pointers into the file's bytes.
 struct Container {
   const LspHeader* header;
-  const LspSection* sections;                   // header->section_count of them, every one inside the file
-  const LspSection* known[kKnownSectionCount];  // null: the file has none
-  bool packed;                                  // some section is compressed
+  const LspSection* sections;               // header->section_count of them, every one inside the file
+  const LspSection* known[format::kKinds];  // by format::Kind; null: the file has none
+  bool packed;                              // some section is compressed
 };
 
 // True if bytes [offset, offset + bytes) lie in [0, size). Every range of a file goes through this.

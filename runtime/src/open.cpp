@@ -27,15 +27,8 @@ extern "C" lsp_status lsp_open(const void* bytes, uint64_t size, lsp_scene* scen
   scene->size = size;
   scene->header = container.header;
   scene->sections = container.sections;
-  scene->nodes = array<LspNode>(bytes, container.known[lsp::kNode]);
-  scene->triangles = array<LspTriangle>(bytes, container.known[lsp::kTria]);
-  scene->normals = array<LspCornerNormals>(bytes, container.known[lsp::kNrml]);
-  scene->materials = array<LspMaterial>(bytes, container.known[lsp::kMatl]);
-  scene->line_spaces = array<LspLineSpace>(bytes, container.known[lsp::kLspc]);
-  scene->bit_words = array<LspBitWord>(bytes, container.known[lsp::kBits]);
-  scene->candidates = array<uint32_t>(bytes, container.known[lsp::kCand]);
-  scene->grid = array<LspBitWord>(bytes, container.known[lsp::kGrid]);
-  scene->cells = array<LspCell>(bytes, container.known[lsp::kCell]);
-  scene->references = array<uint32_t>(bytes, container.known[lsp::kRefs]);
+#define LSP_ARRAY_SECTION(Name, TYPE, code, Element, flag, base, feature, owed, member, ...) \
+  scene->member = array<Element>(bytes, container.known[static_cast<int>(lsp::format::Kind::k##Name)]);
+#include "lsp/sections.def"
   return lsp::succeed(error);
 }

@@ -10,18 +10,11 @@ struct Wanted {
   uint32_t section;
   uint32_t uses;  // any of these asks for it
 };
-constexpr uint32_t kTraces = LSP_USE_EXACT | LSP_USE_APPROXIMATE;
 constexpr Wanted kWanted[] = {
-    {LSP_BINDING_NODES, LSP_SECTION_NODE, kTraces},
-    {LSP_BINDING_NODES, LSP_SECTION_GRID, kTraces},
-    {LSP_BINDING_TRIANGLES, LSP_SECTION_TRIA, kTraces},
-    {LSP_BINDING_NORMALS, LSP_SECTION_NRML, kTraces},
-    {LSP_BINDING_LINE_SPACES, LSP_SECTION_LSPC, LSP_USE_APPROXIMATE},
-    {LSP_BINDING_BIT_WORDS, LSP_SECTION_BITS, LSP_USE_APPROXIMATE},
-    {LSP_BINDING_CANDIDATES, LSP_SECTION_CAND, LSP_USE_APPROXIMATE},
-    {LSP_BINDING_CELLS, LSP_SECTION_CELL, kTraces},
-    {LSP_BINDING_REFERENCES, LSP_SECTION_REFS, kTraces},
-    {LSP_BINDING_NONE, LSP_SECTION_MATL, LSP_USE_MATERIALS},
+#define LSP_ARRAY_SECTION(Name, TYPE, code, Element, flag, base, feature, owed, member, counter, per, uses, \
+                          binding)                                                                          \
+  {binding, LSP_SECTION_##TYPE, uses},
+#include "lsp/sections.def"
 };
 
 const LspSection* find_section(const lsp_scene& scene, uint32_t type) {

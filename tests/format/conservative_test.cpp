@@ -142,7 +142,7 @@ double margin_of(const Image& image) {
 }
 
 void clear_all(Image& image) {
-  for (LspBitWord& word : image.words) word = {0, 0};
+  for (LspBitWord& word : image.bit_words) word = {0, 0};
   for (LspLineSpace& space : image.line_spaces) space.filled = 0;
 }
 
@@ -290,7 +290,7 @@ TEST(Conservative, FindsASingleBit) {
   for (const auto& [space, shaft] : shafts) {
     if (shaft % 37 != 0) continue;
     image = good;
-    image.words[image.line_spaces[space].word_first + shaft / 32].bits &= ~(1u << shaft % 32);
+    image.bit_words[image.line_spaces[space].word_first + shaft / 32].bits &= ~(1u << shaft % 32);
     EXPECT_EQ(found(image), (std::set<Shaft>{{space, shaft}}));
     ++tried;
   }

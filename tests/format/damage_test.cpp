@@ -174,7 +174,7 @@ TEST(Damage, OffsetsNearTheEndOfTheNumbers) {
 // Many Line Spaces that claim the same, largest tables: the check may not take longer than the file is large.
 TEST(Damage, ManyLineSpacesOverTheSameWords) {
   Image image = full_scene();
-  image.words.resize(960000, {0, 0});
+  image.bit_words.resize(960000, {0, 0});
   LspLineSpace space = image.line_spaces[0];
   space.format = 32 | 4 << LSP_FORMAT_ENTRY_SHIFT;
   space.word_first = 0;
@@ -203,7 +203,7 @@ TEST(Damage, AChainOfAMillionNodes) {
 TEST(Damage, AnNTreeOfAMillionLevels) {
   Image image = full_ntree_scene();
   image.line_spaces.clear();
-  image.words.clear();
+  image.bit_words.clear();
   image.candidates.clear();
   image.references.clear();
   image.grid.clear();

@@ -80,7 +80,7 @@ class LargeScene {
     constexpr uint32_t kWords = 30 * 8 * 8 * 8 * 8 / 32;
     const float lo = static_cast<float>(first) - 1, hi = static_cast<float>(first + count) + 1;
     space = {{lo, -1, -1},
-             static_cast<uint32_t>(image_.words.size()),
+             static_cast<uint32_t>(image_.bit_words.size()),
              {hi, 2, 2},
              static_cast<uint32_t>(image_.candidates.size()),
              {8 / (hi - lo), 8 / 3.0f, 8 / 3.0f},
@@ -89,7 +89,7 @@ class LargeScene {
              kWords * 16,
              2 * count,
              reference};
-    for (uint32_t w = 0; w < kWords; ++w) image_.words.push_back({0x5A5A5A5Au, w * 16});
+    for (uint32_t w = 0; w < kWords; ++w) image_.bit_words.push_back({0x5A5A5A5Au, w * 16});
     for (uint32_t w = 0; w < kWords * 8; ++w) image_.candidates.push_back(w % 512 | (w * 7 % 1024) << 16);
   }
 

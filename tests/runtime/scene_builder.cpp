@@ -170,12 +170,7 @@ void complete(Parts& parts, const BuildOptions& options, uint32_t leaves) {
   h.primitive_count = parts.triangles.size();
   h.normal_angle_cos = -0.5f;
   h.plane_tolerance = 0.05f;
-  h.node_count = static_cast<uint32_t>(parts.nodes.size());
-  h.triangle_count = static_cast<uint32_t>(parts.triangles.size());
-  h.line_space_count = static_cast<uint32_t>(parts.line_spaces.size());
-  h.bit_word_count = static_cast<uint32_t>(parts.bit_words.size());
-  h.candidate_word_count = static_cast<uint32_t>(parts.candidates.size());
-  h.material_count = static_cast<uint32_t>(parts.materials.size());
+  format::set_counters(h, parts);
   h.max_stack = h.max_depth + 1;
   h.max_steps = h.node_count + leaves + 1;
   h.resolution = parts.line_spaces.empty() ? 0 : options.resolution;
@@ -216,32 +211,27 @@ uint64_t round_up(uint64_t value, uint64_t alignment) {
 
 Bytes write(const Parts& parts, bool packed) {
   struct Source {
-    uint32_t type, flags, element_bytes;
+    const format::KindInfo& known;
     const void* data;
     size_t count;
   };
-  const auto source = [](uint32_t type, uint32_t flags, const auto& v) {
-    return Source{type, flags, static_cast<uint32_t>(sizeof v[0]), v.data(), v.size()};
-  };
   const Source sources[] = {
-      source(LSP_SECTION_NODE, LSP_SECTION_REQUIRED, parts.nodes),
-      source(LSP_SECTION_TRIA, LSP_SECTION_REQUIRED, parts.triangles),
-      source(LSP_SECTION_NRML, 0, parts.normals),
-      source(LSP_SECTION_MATL, 0, parts.materials),
-      source(LSP_SECTION_LSPC, LSP_SECTION_REQUIRED, parts.line_spaces),
-      source(LSP_SECTION_BITS, LSP_SECTION_REQUIRED, parts.bit_words),
-      source(LSP_SECTION_CAND, LSP_SECTION_REQUIRED, parts.candidates),
-      source(LSP_SECTION_META, 0, parts.meta),
+#define LSP_ARRAY_SECTION(Name, TYPE, code, Element, flag, base, feature, owed, member, ...) \
+  {info(format::Kind::k##Name), parts.member.data(), parts.member.size()},
+#define LSP_BYTE_SECTION(Name, ...) {info(format::Kind::k##Name), parts.meta.data(), parts.meta.size()},
+#include "lsp/sections.def"
   };
   LspHeader header = parts.header;
   std::vector<LspSection> table;
   std::vector<std::string> stored;
   for (const Source& s : sources) {
     if (s.count == 0) continue;
-    const size_t bytes = s.count * s.element_bytes;
+    const format::KindInfo& known = s.known;
+    const uint32_t flags = known.flag == format::SectionFlag::kRequired ? LSP_SECTION_REQUIRED : 0;
+    const size_t bytes = s.count * known.element_bytes;
     const XXH128_hash_t hash = XXH3_128bits(s.data, bytes);
     std::string content(static_cast<const char*>(s.data), bytes);
-    const bool pack = packed && s.type != LSP_SECTION_META;
+    const bool pack = packed && known.type != LSP_SECTION_META;
     if (pack) {
       std::string frame(ZSTD_compressBound(bytes), '\0');
       const size_t size = ZSTD_compress(frame.data(), frame.size(), s.data, bytes, 3);
@@ -249,8 +239,8 @@ Bytes write(const Parts& parts, bool packed) {
       frame.resize(size);
       content = frame;
     }
-    table.push_back({s.type, s.flags, 0, content.size(), bytes, pack ? LSP_CODEC_ZSTD : LSP_CODEC_NONE,
-                     s.element_bytes, s.count, hash.low64, hash.high64});
+    table.push_back({known.type, flags, 0, content.size(), bytes, pack ? LSP_CODEC_ZSTD : LSP_CODEC_NONE,
+                     known.element_bytes, s.count, hash.low64, hash.high64});
     stored.push_back(std::move(content));
   }
   header.section_count = static_cast<uint32_t>(table.size());

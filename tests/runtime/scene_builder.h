@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "lsp/layout.h"
+#include "lsp/sections.h"
 
 namespace lsp::test {
 
@@ -29,13 +29,9 @@ using Bytes = std::vector<unsigned char, PageAllocator<unsigned char>>;
 // The sections of a file and a header that fits them.
 struct Parts {
   LspHeader header{};
-  std::vector<LspNode> nodes;
-  std::vector<LspTriangle> triangles;
-  std::vector<LspCornerNormals> normals;
-  std::vector<LspMaterial> materials;
-  std::vector<LspLineSpace> line_spaces;
-  std::vector<LspBitWord> bit_words;
-  std::vector<uint32_t> candidates;
+#define LSP_ARRAY_SECTION(Name, TYPE, code, Element, flag, base, feature, owed, member, ...) \
+  std::vector<Element> member;
+#include "lsp/sections.def"
   std::string meta = "{}";
 };
 

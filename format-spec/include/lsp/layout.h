@@ -58,18 +58,15 @@ typedef struct lsp_float3 {
 #define LSP_BASE_BVH 1u
 #define LSP_BASE_NTREE 2u
 
-/* Section types, four characters each, first character in the low byte. */
-#define LSP_SECTION_NODE 0x45444F4Eu /* "NODE": LspNode */
-#define LSP_SECTION_TRIA 0x41495254u /* "TRIA": LspTriangle, in leaf order */
-#define LSP_SECTION_NRML 0x4C4D524Eu /* "NRML": LspCornerNormals, one per LspTriangle */
-#define LSP_SECTION_MATL 0x4C54414Du /* "MATL": LspMaterial */
-#define LSP_SECTION_LSPC 0x4350534Cu /* "LSPC": LspLineSpace */
-#define LSP_SECTION_BITS 0x53544942u /* "BITS": LspBitWord */
-#define LSP_SECTION_CAND 0x444E4143u /* "CAND": candidate entries, packed into 32-bit words */
-#define LSP_SECTION_GRID 0x44495247u /* "GRID": LspBitWord, which cells of an NTree node hold something */
-#define LSP_SECTION_CELL 0x4C4C4543u /* "CELL": LspCell */
-#define LSP_SECTION_REFS 0x53464552u /* "REFS": uint, indices of LspTriangle, of an NTree's leaves */
-#define LSP_SECTION_META 0x4154454Du /* "META": provenance, UTF-8 JSON */
+#ifndef GL_core_profile
+/* Section types, LSP_SECTION_NODE and so on: four characters each, the first in the low byte. */
+#define LSP_FOUR(a, b, c, d) ((a) | (b) << 8 | (c) << 16 | (d) << 24)
+enum {
+#define LSP_ARRAY_SECTION(Name, TYPE, code, ...) LSP_SECTION_##TYPE = code,
+#define LSP_BYTE_SECTION(Name, TYPE, code) LSP_SECTION_##TYPE = code,
+#include "lsp/sections.def"
+};
+#endif
 
 /* LspSection.flags */
 #define LSP_SECTION_REQUIRED 0x1u /* a reader that does not know the type refuses the file */
@@ -198,6 +195,14 @@ LSP_END(LspCell)
 #define LSP_MAX_NTREE_DEPTH 4u
 #define LSP_GRID_WORDS(n) (((n) * (n) * (n) + 31u) / 32u)
 #define LSP_CELL_INDEX(x, y, z, n) ((x) + (n) * ((y) + (n) * (z)))
+
+#ifndef GL_core_profile
+/* What a traversal of an NTree visits at most: of every node the cells along a line and the way out of it, or all
+ * filled cells, and every reference. */
+static inline uint64_t lsp_ntree_steps(const LspHeader* h) {
+  return UINT64_C(3) * h->ntree_branching * h->node_count + h->cell_count + h->reference_count;
+}
+#endif
 
 LSP_BEGIN(LspTriangle)
   LSP_VEC3 v0;

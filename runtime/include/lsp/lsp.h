@@ -59,16 +59,10 @@ typedef struct lsp_scene {
   uint64_t size;
   const LspHeader* header;
   const LspSection* sections; /* header->section_count of them */
-  const LspNode* nodes;
-  const LspTriangle* triangles;
-  const LspCornerNormals* normals;
-  const LspMaterial* materials;
-  const LspLineSpace* line_spaces;
-  const LspBitWord* bit_words;
-  const uint32_t* candidates;
-  const LspBitWord* grid; /* of an NTree, as the next two; nodes is NULL then */
-  const LspCell* cells;
-  const uint32_t* references;
+  /* One pointer a section (lsp/sections.def): nodes or, of an NTree, grid, cells, references; triangles, normals,
+   * materials; line_spaces, bit_words, candidates. */
+#define LSP_ARRAY_SECTION(Name, TYPE, code, Element, flag, base, feature, owed, member, ...) const Element* member;
+#include "lsp/sections.def"
 } lsp_scene;
 
 /* Opens the raw (not packed) file in bytes[0, size). `bytes` must be 16-byte aligned and outlive `scene`.

@@ -59,7 +59,12 @@ typedef enum lsp_vulkan_binding {
   LSP_BINDING_NONE = 12 /* of MATL's buffer, which the trace shader does not read */
 } lsp_vulkan_binding;
 
-#define LSP_VULKAN_MAX_BUFFERS 10u
+/* The header's, and one a section that binds. */
+enum {
+  LSP_VULKAN_MAX_BUFFERS = 1
+#define LSP_ARRAY_SECTION(...) +1
+#include "lsp/sections.def"
+};
 
 /* What the library has to know of the device. */
 typedef struct lsp_vulkan_limits {
@@ -77,7 +82,7 @@ typedef struct lsp_vulkan_buffer {
   uint64_t bytes; /* size of the buffer */
 } lsp_vulkan_buffer;
 
-/* The buffers to make, in the order of their bindings; buffers[0] is the header's. */
+/* The buffers to make, in the order of the file; buffers[0] is the header's. */
 typedef struct lsp_vulkan_plan {
   uint32_t buffer_count;
   lsp_vulkan_buffer buffers[LSP_VULKAN_MAX_BUFFERS];
