@@ -143,19 +143,6 @@ struct Fields<LspBitWord> {
   static constexpr Field list[] = {LSP_FIELD(bits), LSP_FIELD(offset)};
 };
 
-template <>
-struct Fields<LspRay> {
-  using Owner = LspRay;
-  static constexpr Field list[] = {LSP_FIELD(origin), LSP_FIELD(tmin), LSP_FIELD(direction), LSP_FIELD(tmax)};
-};
-
-template <>
-struct Fields<LspHit> {
-  using Owner = LspHit;
-  static constexpr Field list[] = {LSP_FIELD(t), LSP_FIELD(primitive), LSP_FIELD(u),
-                                   LSP_FIELD(v), LSP_FIELD(normal),    LSP_FIELD(flags)};
-};
-
 // Every byte of a struct belongs to one field: the table forgets none.
 template <class T>
 constexpr Struct describe(const char* name) {
@@ -172,15 +159,14 @@ constexpr bool complete() {
 }
 static_assert(complete<LspHeader>() && complete<LspSection>() && complete<LspNode>() && complete<LspCell>() &&
               complete<LspTriangle>() && complete<LspCornerNormals>() && complete<LspMaterial>() &&
-              complete<LspLineSpace>() && complete<LspBitWord>() && complete<LspRay>() && complete<LspHit>());
+              complete<LspLineSpace>() && complete<LspBitWord>());
 
 constexpr Struct kStructs[] = {
     describe<LspHeader>("LspHeader"),     describe<LspSection>("LspSection"),
     describe<LspNode>("LspNode"),         describe<LspCell>("LspCell"),
     describe<LspTriangle>("LspTriangle"), describe<LspCornerNormals>("LspCornerNormals"),
     describe<LspMaterial>("LspMaterial"), describe<LspLineSpace>("LspLineSpace"),
-    describe<LspBitWord>("LspBitWord"),   describe<LspRay>("LspRay"),
-    describe<LspHit>("LspHit"),
+    describe<LspBitWord>("LspBitWord"),
 };
 
 template <class T>

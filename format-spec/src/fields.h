@@ -27,7 +27,7 @@ struct Struct {
   std::span<const Field> fields;
 };
 
-// All structs of layout.h, rays and hits too.
+// All structs of layout.h.
 std::span<const Struct> structs();
 const Struct& struct_named(const char* name);
 

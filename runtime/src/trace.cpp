@@ -4,10 +4,6 @@
 
 namespace {
 
-// What an exact trace heeds, and an approximate one.
-constexpr uint32_t kExactFlags = LSP_TRACE_ANY_HIT | LSP_TRACE_SKIP_EMPTY;
-constexpr uint32_t kApproximateFlags = LSP_TRACE_ALL_FLAGS & ~LSP_TRACE_SKIP_EMPTY;
-
 lsp_status refuse(lsp_error* error, const char* message) {
   if (error) {
     *error = {LSP_ERROR_UNSUPPORTED, 0, {}};
@@ -25,15 +21,12 @@ extern "C" lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options*
       (options->flags & LSP_TRACE_APPROXIMATE) != 0 && (features & LSP_FEATURE_LINE_SPACES) != 0;
   if (!approximate && !(features & LSP_FEATURE_EXACT))
     return refuse(error, "the file has no exact tree, trace it approximately or bake it without --no-exact");
-  uint32_t flags = options->flags & (approximate ? kApproximateFlags : kExactFlags);
+  uint32_t flags = options->flags & (approximate ? lsp::kApproximateFlags : lsp::kExactFlags);
   constexpr uint32_t kConservative = LSP_FEATURE_LINE_SPACES | LSP_FEATURE_BINARY;  // what such a file has
   if ((features & kConservative) != kConservative) flags &= ~LSP_TRACE_SKIP_EMPTY;
   if (flags & LSP_TRACE_NEAR_APPROXIMATE) flags &= ~LSP_TRACE_NEAR_SKIP;
   const bool ntree = scene->header->base_structure == LSP_BASE_NTREE;
   const lsp::TraceLoops& loops = ntree ? lsp::kNTreeLoops : lsp::kBvhLoops;
-  if (counts)
-    loops.counting(*scene, flags, options->lod, rays, hits, count, *counts);
-  else
-    loops.plain[flags](*scene, options->lod, rays, hits, count);
+  loops.of[flags](*scene, options->lod, rays, hits, count, counts);
   return LSP_OK;
 }

@@ -1,3 +1,27 @@
+#include "trace_group.h"
+
+namespace lsp {
+namespace {
+
+using namespace subset;
+
+struct NTreeTraversal {
 #define LSP_NTREE
-#define LSP_LOOPS kNTreeLoops
-#include "trace_loops.inc"
+#include "lsp/traverse.h"
+
+  LSP_STEP void fetch_leaf(const lsp_scene& scene) const {
+    fetch(scene.references, lsp_walk.ref & ~LSP_LEAF_BIT);
+  }
+  LSP_STEP void fetch_triangles(const lsp_scene& scene) {
+    constexpr uint32_t kAhead = 8;  // triangles of a leaf that are asked for before its test
+    const uint32_t count = lsp_ntree_leaf_count(scene);
+    for (uint32_t i = 0; i < count && i < kAhead; ++i)
+      fetch(scene.triangles, lsp_load_reference(scene, (lsp_walk.ref & ~LSP_LEAF_BIT) + i));
+  }
+};
+
+}  // namespace
+
+const TraceLoops kNTreeLoops = loops_of<NTreeTraversal>();
+
+}  // namespace lsp

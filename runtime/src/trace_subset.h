@@ -1,13 +1,27 @@
-// Makes C++ read lsp/traverse.h: the GLSL names it uses, and access to a scene's arrays.
+// Makes C++ read lsp/traverse.h: the GLSL names it uses, and access to a scene's arrays. The text is then included in
+// a struct within a namespace that uses lsp::subset.
 //
-// Included once per variant inside a namespace, with LSP_COUNT defined or not. Every array access is checked
-// against the header's counts, which lsp_open has checked against the file: a bad index reads a zero element.
+// Every array access is checked against the header's counts, which lsp_open has checked against the file: a bad index
+// reads a zero element.
+#pragma once
+
 #include <bit>
 #include <cmath>
 #include <cstdint>
 #include <glm/glm.hpp>
 
 #include "lsp/lsp.h"
+
+#ifdef __SANITIZE_ADDRESS__
+#define LSP_INLINE  // inlined and instrumented, the loops take minutes to compile
+#else
+#define LSP_INLINE __attribute__((always_inline))
+#endif
+#define LSP_FN static inline LSP_INLINE
+// A function that most rays call once or twice: better not inlined into the loop.
+#define LSP_FN_RARE static __attribute__((noinline))
+#define LSP_STEP inline LSP_INLINE
+#define LSP_STACK_SIZE LSP_MAX_STACK
 
 namespace lsp::subset {
 
@@ -16,9 +30,10 @@ using glm::uvec4;
 using glm::vec2;
 using glm::vec3;
 using uint = uint32_t;
+using LspScene = const lsp_scene&;
 
-inline vec3 load3(const lsp_float3& v) { return {v.x, v.y, v.z}; }
-inline lsp_float3 store3(const vec3& v) { return {v.x, v.y, v.z}; }
+inline vec3 lsp_vec3(const lsp_float3& v) { return {v.x, v.y, v.z}; }
+inline lsp_float3 lsp_float3_of(const vec3& v) { return {v.x, v.y, v.z}; }
 inline uint floatBitsToUint(float x) { return std::bit_cast<uint>(x); }
 inline float uintBitsToFloat(uint x) { return std::bit_cast<float>(x); }
 inline int findLSB(uint x) { return x == 0 ? -1 : std::countr_zero(x); }
@@ -28,39 +43,48 @@ inline vec3 abs(const vec3& v) { return {std::fabs(v.x), std::fabs(v.y), std::fa
 inline float sqrt(float x) { return std::sqrt(x); }
 
 template <typename T>
-inline const T& at(const T* array, uint index, uint count) {
+LSP_INLINE inline const T& at(const T* array, uint index, uint count) {
   static const T zero{};
   return index < count ? array[index] : zero;
 }
 
-}  // namespace lsp::subset
+LSP_INLINE inline const LspHeader& lsp_load_header(LspScene scene) { return *scene.header; }
+LSP_INLINE inline bool lsp_has_normals(LspScene scene) { return scene.normals != nullptr; }
+LSP_INLINE inline const LspNode& lsp_load_node(LspScene scene, uint i) { return at(scene.nodes, i, scene.header->node_count); }
+LSP_INLINE inline const LspTriangle& lsp_load_triangle(LspScene scene, uint i) {
+  return at(scene.triangles, i, scene.header->triangle_count);
+}
+LSP_INLINE inline const LspCornerNormals& lsp_load_normals(LspScene scene, uint i) {
+  return at(scene.normals, i, scene.header->triangle_count);
+}
+LSP_INLINE inline const LspLineSpace& lsp_load_line_space(LspScene scene, uint i) {
+  return at(scene.line_spaces, i, scene.header->line_space_count);
+}
+LSP_INLINE inline const LspBitWord& lsp_load_bit_word(LspScene scene, uint i) {
+  return at(scene.bit_words, i, scene.header->bit_word_count);
+}
+LSP_INLINE inline uint lsp_load_candidate(LspScene scene, uint i) {
+  return at(scene.candidates, i, scene.header->candidate_word_count);
+}
+LSP_INLINE inline const LspBitWord& lsp_load_grid(LspScene scene, uint i) {
+  return at(scene.grid, i, scene.header->node_count * LSP_GRID_WORDS(scene.header->ntree_branching));
+}
+LSP_INLINE inline const LspCell& lsp_load_cell(LspScene scene, uint i) { return at(scene.cells, i, scene.header->cell_count); }
+LSP_INLINE inline uint lsp_load_reference(LspScene scene, uint i) {
+  return at(scene.references, i, scene.header->reference_count);
+}
 
-#ifdef __SANITIZE_ADDRESS__
-#define LSP_INLINE  // inlined and instrumented, sixteen loops take minutes to compile
-#define LSP_FN [[maybe_unused]] static
-#else
-#define LSP_INLINE __attribute__((always_inline))
-#define LSP_FN static inline LSP_INLINE
-#endif
-#define LSP_FN_RARE [[maybe_unused]] static __attribute__((noinline))
-#define LSP_SPLIT_FAR
-#define LSP_IN(T) const T&
-#define LSP_OUT(T) T&
-#define LSP_INOUT(T) T&
-#define LSP_PRECISE
-#define LSP_SCENE_ const lsp_scene &scene,
-#define LSP_SCENE_ARG_ scene,
-#define LSP_LOAD3(v) load3(v)
-#define LSP_STORE3(v) store3(v)
-#define LSP_HEADER (*scene.header)
-#define LSP_NODE(i) at(scene.nodes, i, scene.header->node_count)
-#define LSP_TRIANGLE(i) at(scene.triangles, i, scene.header->triangle_count)
-#define LSP_NORMALS(i) at(scene.normals, i, scene.header->triangle_count)
-#define LSP_LINE_SPACE(i) at(scene.line_spaces, i, scene.header->line_space_count)
-#define LSP_BIT_WORD(i) at(scene.bit_words, i, scene.header->bit_word_count)
-#define LSP_CANDIDATE(i) at(scene.candidates, i, scene.header->candidate_word_count)
-#define LSP_GRID(i) at(scene.grid, i, scene.header->node_count* LSP_GRID_WORDS(scene.header->ntree_branching))
-#define LSP_CELL(i) at(scene.cells, i, scene.header->cell_count)
-#define LSP_REFERENCE(i) at(scene.references, i, scene.header->reference_count)
-#define LSP_HAS_NORMALS (scene.normals != nullptr)
-#define LSP_STACK_SIZE LSP_MAX_STACK
+// Asks for an element that is read later. It need not be there.
+template <typename T>
+LSP_INLINE inline void fetch(const T* array, uint64_t index) {
+  const uintptr_t first = reinterpret_cast<uintptr_t>(array) + index * sizeof(T);
+  __builtin_prefetch(reinterpret_cast<const void*>(first));
+  if (64 % sizeof(T) != 0) __builtin_prefetch(reinterpret_cast<const void*>(first + sizeof(T) - 1));
+}
+
+// Exact rays, which are traced one after the other, would not have the time to wait for it.
+LSP_INLINE inline void lsp_fetch_node(LspScene scene, uint flags, uint i) {
+  if ((flags & LSP_TRACE_APPROXIMATE) != 0u) fetch(scene.nodes, i);
+}
+
+}  // namespace lsp::subset

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "lsp/layout.h"
+#include "lsp/interface.h"
 
 namespace lsp {
 

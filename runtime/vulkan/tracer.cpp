@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <chrono>
+#include <cstddef>
 #include <cstring>
 #include <map>
 #include <memory>
@@ -13,6 +14,14 @@ namespace {
 constexpr uint32_t kBatchRays = 1u << 20;
 constexpr VkMemoryPropertyFlags kHost =
     VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
+
+// The counting shader adds to the counts as to 64-bit words.
+constexpr bool is_counter(size_t offset, uint32_t number) { return offset == number * sizeof(uint64_t); }
+static_assert(is_counter(offsetof(lsp_trace_counts, invalid), LSP_COUNTER_INVALID));
+static_assert(is_counter(offsetof(lsp_trace_counts, hits), LSP_COUNTER_HITS));
+static_assert(is_counter(offsetof(lsp_trace_counts, nodes), LSP_COUNTER_NODES));
+static_assert(is_counter(offsetof(lsp_trace_counts, shafts), LSP_COUNTER_SHAFTS));
+static_assert(is_counter(offsetof(lsp_trace_counts, triangles), LSP_COUNTER_TRIANGLES));
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

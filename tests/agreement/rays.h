@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "lsp/interface.h"
 #include "scene_builder.h"
 
 namespace lsp::test {

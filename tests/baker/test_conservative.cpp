@@ -16,14 +16,14 @@
 #include "trace_subset.h"
 
 // The tracer's own text, to see which shaft a ray takes and which triangle it hits.
-#define LSP_COUNTS_PARAM
-#define LSP_COUNTS_ARG
 namespace lsp::test {
 namespace {
-namespace tracer {
+
 using namespace lsp::subset;
+
+struct Tracer {
 #include "lsp/traverse.h"
-}  // namespace tracer
+};
 
 class Numbers {
  public:
@@ -248,20 +248,21 @@ template <typename Bits>
 Checked check_bits(const Baked& baked, size_t count, Bits&& bits) {
   const lsp_scene scene = view(baked);
   Checked checked;
+  Tracer tracer;
   for (LspRay ray : rays_about(scene, count, 17)) {
     ray.tmin = -INFINITY;  // the whole line
     ray.tmax = INFINITY;
-    tracer::LspSetup setup;
-    if (!tracer::lsp_setup(scene, ray, setup) || !tracer::lsp_may_skip_empty(scene, setup)) continue;
+    const Tracer::LspSetup setup = tracer.lsp_setup(scene, ray);
+    if (!setup.valid || !tracer.lsp_may_skip_empty(scene, setup)) continue;
     for (uint32_t k = 0; k < baked.header.line_space_count; ++k) {
       const LspLineSpace& ls = scene.line_spaces[k];
-      const tracer::LspPassage pass = tracer::lsp_pass(setup, ls);
+      const Tracer::LspPassage pass = tracer.lsp_pass(setup, ls);
       if (!(pass.t_in <= pass.t_out)) continue;
       for (uint32_t t = ls.triangle_first; t < ls.triangle_first + ls.triangle_count; ++t) {
-        tracer::LspBest best;
+        Tracer::LspBest best;
         best.t = INFINITY;
         best.triangle = LSP_NONE;
-        tracer::lsp_triangle(scene, setup, t, best);
+        best = tracer.lsp_triangle(scene, setup, t, best);
         if (best.triangle == LSP_NONE) continue;
         ++checked.hits;
         checked.clear += !bits(k, pass.shaft);
@@ -330,6 +331,7 @@ TEST(Conservative, NeedsItsMargin) {
     lsp_scene scene{};
     scene.header = &header;
     scene.triangles = &t;
+    Tracer tracer;
     header.triangle_count = 1;
     std::vector<uint32_t> shafts[2];
     for (int without = 0; without < 2; ++without) {
@@ -341,13 +343,13 @@ TEST(Conservative, NeedsItsMargin) {
       const glm::dvec3 from = q + glm::dvec3(r.between(-0.2, 0.2), 0, i % 2 ? 1 : -1);
       const lsp_float3 o = floats(from);
       const LspRay ray = {o, 0, floats(q - vec(o)), INFINITY};
-      tracer::LspSetup setup;
-      ASSERT_TRUE(tracer::lsp_setup(scene, ray, setup) && tracer::lsp_may_skip_empty(scene, setup));
-      tracer::LspBest best{};
+      const Tracer::LspSetup setup = tracer.lsp_setup(scene, ray);
+      ASSERT_TRUE(setup.valid && tracer.lsp_may_skip_empty(scene, setup));
+      Tracer::LspBest best{};
       best.t = INFINITY;
       best.triangle = LSP_NONE;
-      tracer::lsp_triangle(scene, setup, 0, best);
-      const tracer::LspPassage pass = tracer::lsp_pass(setup, ls);
+      best = tracer.lsp_triangle(scene, setup, 0, best);
+      const Tracer::LspPassage pass = tracer.lsp_pass(setup, ls);
       if (best.triangle == LSP_NONE || !(pass.t_in <= pass.t_out)) continue;
       ++hits;
       for (int without = 0; without < 2; ++without) clear[without] += shafts[without][pass.shaft] == LSP_NONE;

@@ -5,8 +5,11 @@
 #include "trace_subset.h"
 
 namespace lsp::bench::wide {
+
 using namespace lsp::subset;
-#define LSP_COUNTS_PARAM
-#define LSP_COUNTS_ARG
+
+struct Text {
 #include "lsp/traverse.h"
+};
+
 }  // namespace lsp::bench::wide

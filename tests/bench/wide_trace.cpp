@@ -14,8 +14,8 @@ namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 using hn::CappedTag;
-using wide::LspBest;
-using wide::LspSetup;
+using LspBest = wide::Text::LspBest;
+using LspSetup = wide::Text::LspSetup;
 
 // Lanes of a mask as bits, lane 0 lowest.
 template <class D, class M>
@@ -79,6 +79,8 @@ HWY_INLINE uint32_t hit_children(const WideNode& node, const Frame& frame, float
 // own lsp_plane_depth.
 HWY_INLINE void hit_block(const TriangleBlock& block, const LspSetup& s, const Frame& frame, LspBest& best) {
   const CappedTag<float, kBlockTriangles> d;
+  wide::Text text;
+  const glm::vec3 direction = text.lsp_rotate(s.direction, s.axis);
   const size_t x = frame.order[0], y = frame.order[1], z = frame.order[2];
   for (size_t i = 0; i < kBlockTriangles; i += hn::Lanes(d)) {
     const auto corner = [&](size_t c, size_t axis, size_t place) HWY_ATTR {
@@ -112,14 +114,14 @@ HWY_INLINE void hit_block(const TriangleBlock& block, const LspSetup& s, const F
     for (; left != 0; left &= left - 1) {
       const auto lane = static_cast<size_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(left));
       const float det = us[lane] + vs[lane] + ws[lane];
-      if (det == 0.0f || !wide::lsp_is_finite(det)) continue;
+      if (det == 0.0f || !text.lsp_is_finite(det)) continue;
       const auto seen = [&](size_t c) {
         const auto value = [&](size_t axis, size_t place) {
           return block.corner[3 * c + axis][i + lane] - frame.origin[place];
         };
         return glm::vec3(value(x, 0), value(y, 1), value(z, 2));
       };
-      const float t = wide::lsp_plane_depth(s, seen(0), seen(1), seen(2));
+      const float t = text.lsp_plane_depth(direction, s.shear.z, seen(0), seen(1), seen(2));
       if (!(t > s.tmin && t < best.t)) continue;
       best.t = t;
       best.u = vs[lane] / det;
@@ -191,19 +193,20 @@ void trace_rays(const WideTree& tree, bool any, std::span<const LspRay> rays, st
   const lsp_scene& scene = tree.scene();
   const WideNode* nodes = tree.nodes().data();
   const TriangleBlock* blocks = tree.blocks().data();
+  wide::Text text;
   for (size_t i = 0; i < rays.size(); ++i) {
-    LspSetup s;
-    if (!wide::lsp_setup(scene, rays[i], s)) {
-      hits[i] = wide::lsp_no_hit();
+    const LspSetup s = text.lsp_setup(scene, rays[i]);
+    if (!s.valid) {
+      hits[i] = text.lsp_no_hit();
       continue;
     }
-    LspBest best = wide::lsp_no_best(s);
+    LspBest best = text.lsp_no_best(s);
     if (any)
       traverse<true>(nodes, blocks, s, best);
     else
       traverse<false>(nodes, blocks, s, best);
     best.complete = true;
-    hits[i] = wide::lsp_finish(scene, s, rays[i], best);
+    hits[i] = text.lsp_finish(scene, s, rays[i], best);
   }
 }
 

@@ -42,7 +42,8 @@ lsp_variant(farther_wins traverse.h
 lsp_variant(tmin_ignored traverse.h
   "if (t > s.tmin && t < best.t) {" "if (t < best.t) {")
 lsp_variant(near_child_only bvh.h
-  "if (stack_t[top] <= best.t) ref = stack_ref[top];" "if (stack_t[top] > best.t) ref = stack_ref[top];")
+  "if (lsp_stack_t[next.top] <= best_t) next.ref = lsp_stack_ref[next.top];"
+  "if (lsp_stack_t[next.top] > best_t) next.ref = lsp_stack_ref[next.top];")
 lsp_variant(no_patch_clamp traverse.h
   "u = u < top ? u : top" "u = u < 2.0f * top ? u : top")
 lsp_variant(no_depth_clamp traverse.h
@@ -51,8 +52,8 @@ lsp_variant(no_depth_clamp traverse.h
 lsp_variant(slab_flipped traverse.h
   "lsp_max(lsp_min(a.z, b.z), s.tmin)" "lsp_max(lsp_max(a.z, b.z), s.tmin)")
 lsp_variant(infinite_origin traverse.h
-  "if (!lsp_all_finite(o) || !lsp_all_finite(d)) return false;" "")
+  "if (!lsp_all_finite(o) || !lsp_all_finite(d)) return s;" "")
 lsp_variant(cell_skipped ntree.h
-  "vec3 plane = lsp_ntree_lo(LSP_SCENE_ARG_ cell + ahead, size);"
-  "vec3 plane = lsp_ntree_lo(LSP_SCENE_ARG_ cell + ivec3(ahead.x, 1 - ahead.y, ahead.z), size);")
+  "vec3 plane = lsp_ntree_lo(scene, cell + ahead, size);"
+  "vec3 plane = lsp_ntree_lo(scene, cell + ivec3(ahead.x, 1 - ahead.y, ahead.z), size);")
 file(CONFIGURE OUTPUT ${mutants_dir}/variants.inc CONTENT "${variants_inc}" @ONLY)

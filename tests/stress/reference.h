@@ -5,7 +5,7 @@
 #include <array>
 #include <glm/glm.hpp>
 
-#include "lsp/layout.h"
+#include "lsp/interface.h"
 #include "soup.h"
 
 namespace lsp::stress {

@@ -267,26 +267,6 @@ LSP_BEGIN(LspBitWord)
   LSP_UINT offset;
 LSP_END(LspBitWord)
 
-/* A ray; t counts in lengths of the direction. A hit needs tmin < t < tmax. */
-LSP_BEGIN(LspRay)
-  LSP_VEC3 origin;
-  LSP_FLOAT tmin;
-  LSP_VEC3 direction;
-  LSP_FLOAT tmax;
-LSP_END(LspRay)
-
-LSP_BEGIN(LspHit)
-  LSP_FLOAT t;        /* infinity: no hit */
-  LSP_UINT primitive; /* in import order; LSP_NONE: no hit */
-  LSP_FLOAT u;        /* weight of corner 1; outside [0, 1] where a plane was extrapolated */
-  LSP_FLOAT v;        /* weight of corner 2 */
-  LSP_VEC3 normal;    /* unit shading normal */
-  LSP_UINT flags;     /* LSP_HIT_* */
-LSP_END(LspHit)
-
-#define LSP_HIT_LINE_SPACE 0x1u    /* answered by a Line Space */
-#define LSP_HIT_ORIGIN_INSIDE 0x2u /* the origin lies inside that Line Space's node */
-
 #if defined(__cplusplus)
 #define LSP_STATIC_ASSERT(condition) static_assert(condition)
 #elif !defined(GL_core_profile)
@@ -302,8 +282,6 @@ LSP_STATIC_ASSERT(sizeof(LspCornerNormals) == 12);
 LSP_STATIC_ASSERT(sizeof(LspMaterial) == 48);
 LSP_STATIC_ASSERT(sizeof(LspLineSpace) == 64);
 LSP_STATIC_ASSERT(sizeof(LspBitWord) == 8);
-LSP_STATIC_ASSERT(sizeof(LspRay) == 32);
-LSP_STATIC_ASSERT(sizeof(LspHit) == 32);
 #undef LSP_STATIC_ASSERT
 #endif
 

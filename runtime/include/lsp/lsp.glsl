@@ -5,18 +5,19 @@
  *   #define LSP_SET 0                // descriptor set of the scene's buffers, default 0
  *   #define LSP_FIRST_BINDING 0      // binding of the header; the others follow it, default 0
  *   #define LSP_NTREE                // the scene's base structure is an NTree, not a BVH
+ *   #define LSP_ADDRESSES            // sections are read through addresses, see lsp_addresses.glsl
  *   #include "lsp/lsp.glsl"
  *
- *   LspHit hit = lsp_trace(ray, LSP_TRACE_APPROXIMATE_BIT, 0.0);
+ *   LspHit hit = lsp_trace(lsp_bound_scene(), ray, LSP_TRACE_APPROXIMATE, 0.0);
  *
- * Bindings, each a read-only storage buffer, all from the file as it lies on disk:
+ * Bindings (LSP_BINDING_* of lsp/interface.h), each a read-only storage buffer, all from the file as it lies on disk:
  *   +0 header   +1 NODE   +2 TRIA   +3 NRML   +4 LSPC   +5 BITS   +6 CAND
  * and of an NTree
  *   +1 GRID   +7 CELL   +8 REFS
  * A section the file does not have is bound to any buffer (the header's, say): it is not read.
  *
  * The stack lives in LSP_STACK_SIZE entries of 8 bytes: define it as header.max_stack, or leave it to the
- * specialization constant LSP_STACK_CONSTANT_ID (default 0), whose default is LSP_MAX_STACK.
+ * specialization constant LSP_STACK_CONSTANT_ID (default LSP_VULKAN_STACK_CONSTANT), whose default is LSP_MAX_STACK.
  *
  * What few scenes need (LSP_PART_* of lsp/parts.h) is left out where it is not asked for: define LSP_PARTS, or
  * LSP_PARTS_CONSTANT_ID as the number of a specialization constant, whose default is everything;
@@ -26,7 +27,7 @@
 #ifndef LSP_GLSL
 #define LSP_GLSL
 
-#include "lsp/layout.h"
+#include "lsp/interface.h"
 
 #ifndef LSP_SET
 #define LSP_SET 0
@@ -36,7 +37,7 @@
 #endif
 #ifndef LSP_STACK_SIZE
 #ifndef LSP_STACK_CONSTANT_ID
-#define LSP_STACK_CONSTANT_ID 0
+#define LSP_STACK_CONSTANT_ID LSP_VULKAN_STACK_CONSTANT
 #endif
 layout(constant_id = LSP_STACK_CONSTANT_ID) const uint lsp_stack_size = LSP_MAX_STACK;
 #define LSP_STACK_SIZE lsp_stack_size
@@ -47,99 +48,46 @@ layout(constant_id = LSP_PARTS_CONSTANT_ID) const uint lsp_parts = 0xFFFFFFFFu;
 #define LSP_PARTS lsp_parts
 #endif
 
-/* Arrays are read 16 bytes at a time, which is faster than member by member; the functions below put the
- * words into the structs of layout.h. */
-layout(std430, set = LSP_SET, binding = LSP_FIRST_BINDING + 0) readonly buffer LspHeaderBuffer { LspHeader lsp_header; };
-#ifdef LSP_NTREE
-layout(std430, set = LSP_SET, binding = LSP_FIRST_BINDING + 1) readonly buffer LspGridBuffer { uvec2 lsp_grid_words[]; };
-layout(std430, set = LSP_SET, binding = LSP_FIRST_BINDING + 7) readonly buffer LspCellBuffer { LspCell lsp_cells[]; };
-layout(std430, set = LSP_SET, binding = LSP_FIRST_BINDING + 8) readonly buffer LspReferenceBuffer { uint lsp_references[]; };
-#else
-layout(std430, set = LSP_SET, binding = LSP_FIRST_BINDING + 1) readonly buffer LspNodeBuffer { uvec4 lsp_node_words[]; };
-#endif
-layout(std430, set = LSP_SET, binding = LSP_FIRST_BINDING + 2) readonly buffer LspTriangleBuffer { uvec4 lsp_triangle_words[]; };
-layout(std430, set = LSP_SET, binding = LSP_FIRST_BINDING + 3) readonly buffer LspNormalBuffer { LspCornerNormals lsp_corner_normals[]; };
-layout(std430, set = LSP_SET, binding = LSP_FIRST_BINDING + 4) readonly buffer LspLineSpaceBuffer { uvec4 lsp_line_space_words[]; };
-layout(std430, set = LSP_SET, binding = LSP_FIRST_BINDING + 5) readonly buffer LspBitWordBuffer { uvec2 lsp_bit_words[]; };
-layout(std430, set = LSP_SET, binding = LSP_FIRST_BINDING + 6) readonly buffer LspCandidateBuffer { uint lsp_candidate_words[]; };
+layout(std430, set = LSP_SET, binding = LSP_FIRST_BINDING + LSP_BINDING_HEADER) readonly buffer LspHeaderBuffer {
+  LspHeader lsp_header;
+};
 
-#define LSP_FN
-#define LSP_IN(T) T
-#define LSP_OUT(T) out T
-#define LSP_INOUT(T) inout T
-#define LSP_PRECISE precise
-#define LSP_SCENE_
-#define LSP_SCENE_ARG_
-#define LSP_LOAD3(v) (v)
-#define LSP_STORE3(v) (v)
-#define LSP_HEADER lsp_header
-#define LSP_HAS_NORMALS ((lsp_header.required_features & LSP_FEATURE_NORMALS) != 0u)
-#define LSP_TRIANGLE(i) lsp_load_triangle(i)
-#define LSP_NORMALS(i) lsp_corner_normals[i]
-#define LSP_LINE_SPACE(i) lsp_load_line_space(i)
-#define LSP_BIT_WORD(i) lsp_load_bit_word(i)
-#define LSP_CANDIDATE(i) lsp_candidate_words[i]
-
-#ifdef LSP_NTREE
-#define LSP_GRID(i) lsp_load_grid(i)
-#define LSP_CELL(i) lsp_cells[i]
-#define LSP_REFERENCE(i) lsp_references[i]
-
-LspBitWord lsp_load_grid(uint i) {
-  uvec2 w = lsp_grid_words[i];
-  return LspBitWord(w.x, w.y);
-}
-#else
-#define LSP_NODE(i) lsp_load_node(i)
-
-LspNode lsp_load_node(uint i) {
-  uvec4 a = lsp_node_words[4u * i];
-  uvec4 b = lsp_node_words[4u * i + 1u];
-  uvec4 c = lsp_node_words[4u * i + 2u];
-  uvec4 d = lsp_node_words[4u * i + 3u];
+/* Arrays are read 16 bytes at a time, which is faster than member by member. */
+LspNode lsp_node_of(uvec4 a, uvec4 b, uvec4 c, uvec4 d) {
   return LspNode(uintBitsToFloat(a.xyz), a.w, uintBitsToFloat(b.xyz), b.w, uintBitsToFloat(c.xyz), c.w,
                  uintBitsToFloat(d.xyz), d.w);
 }
-#endif
 
-LspTriangle lsp_load_triangle(uint i) {
-  uvec4 a = lsp_triangle_words[3u * i];
-  uvec4 b = lsp_triangle_words[3u * i + 1u];
-  uvec4 c = lsp_triangle_words[3u * i + 2u];
+LspTriangle lsp_triangle_of(uvec4 a, uvec4 b, uvec4 c) {
   return LspTriangle(uintBitsToFloat(a.xyz), a.w, uintBitsToFloat(b.xyz), b.w, uintBitsToFloat(c.xyz), c.w);
 }
 
-LspLineSpace lsp_load_line_space(uint i) {
-  uvec4 a = lsp_line_space_words[4u * i];
-  uvec4 b = lsp_line_space_words[4u * i + 1u];
-  uvec4 c = lsp_line_space_words[4u * i + 2u];
-  uvec4 d = lsp_line_space_words[4u * i + 3u];
+LspLineSpace lsp_line_space_of(uvec4 a, uvec4 b, uvec4 c, uvec4 d) {
   return LspLineSpace(uintBitsToFloat(a.xyz), a.w, uintBitsToFloat(b.xyz), b.w, uintBitsToFloat(c.xyz), c.w, d.x,
                       d.y, d.z, d.w);
 }
 
-LspBitWord lsp_load_bit_word(uint i) {
-  uvec2 w = lsp_bit_words[i];
-  return LspBitWord(w.x, w.y);
-}
-
-/* With LSP_COUNT defined, lsp_trace_ray takes an inout LspCounts after `valid`. */
-#ifdef LSP_COUNT
-#define LSP_COUNTS_PARAM , inout LspCounts counts
-#define LSP_COUNTS_ARG , counts
+#ifdef LSP_ADDRESSES
+#include "lsp/lsp_addresses.glsl"
 #else
-#define LSP_COUNTS_PARAM
-#define LSP_COUNTS_ARG
+#include "lsp/lsp_descriptors.glsl"
 #endif
+
+/* What lsp/traverse.h asks for besides. */
+LspHeader lsp_load_header(LspScene scene) { return lsp_header; }
+bool lsp_has_normals(LspScene scene) { return (lsp_header.required_features & LSP_FEATURE_NORMALS) != 0u; }
+void lsp_fetch_node(LspScene scene, uint flags, uint i) {}
+vec3 lsp_vec3(vec3 v) { return v; }
+vec3 lsp_float3_of(vec3 v) { return v; }
+#define LSP_FN
+#define LSP_STEP
+#define LSP_FN_RARE
 
 #include "lsp/traverse.h"
 
-#ifndef LSP_COUNT
-/* flags: LSP_TRACE_*_BIT; lod: stop at a Line Space once its diagonal is under lod * distance, 0: deepest. */
-LspHit lsp_trace(LspRay ray, uint flags, float lod) {
-  bool valid;
-  return lsp_trace_ray(ray, flags, lod, valid);
+/* flags: LSP_TRACE_*; lod: stop at a Line Space once its diagonal is under lod * distance, 0: deepest. */
+LspHit lsp_trace(LspScene scene, LspRay ray, uint flags, float lod) {
+  return lsp_trace_ray(scene, ray, flags, lod).hit;
 }
-#endif
 
 #endif

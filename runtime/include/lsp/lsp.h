@@ -14,7 +14,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "lsp/layout.h"
+#include "lsp/interface.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -88,33 +88,12 @@ lsp_status lsp_unpack(const void* bytes, uint64_t size, void* out, uint64_t out_
 
 /* ---- tracing on the CPU --------------------------------------------------------------------------------- */
 
-/* lsp_trace_options.flags */
-#define LSP_TRACE_APPROXIMATE 0x1u      /* stop at Line Spaces; without it: exact, down to triangles */
-#define LSP_TRACE_ANY_HIT 0x2u          /* any hit in (tmin, tmax), not the closest */
-#define LSP_TRACE_NEAR_APPROXIMATE 0x4u /* answer from a Line Space even where the origin lies inside it */
-
-/* LspHit.flags: the traversal ended with work left, the answer is not to be trusted. In the library this only
- * happens to files whose declared bounds are wrong; on a device also where it cuts long loops short. */
-#define LSP_HIT_INCOMPLETE 0x80000000u
-
-/* Where the origin lies inside a Line Space: first ask the shaft of the opposite direction for the last surface
- * on the ray's line, and trace exactly only when that lies ahead. Saves most of the exact work near the origin
- * for a small error; ignored with LSP_TRACE_NEAR_APPROXIMATE. */
-#define LSP_TRACE_NEAR_SKIP 0x8u
-
-/* Exact traces: ask conservative Line Spaces (lsp-bake --conservative) first, and leave out a node whose shaft is
- * proven empty. The answers are the same to the bit, any hit's too; fewer nodes are visited, for a look-up at every
- * Line Space passed. Does nothing in approximate traces, in files without such Line Spaces, and for rays that begin
- * further than about two extents from the scene, whose rounding the Line Spaces do not cover. */
-#define LSP_TRACE_SKIP_EMPTY 0x10u
-#define LSP_TRACE_ALL_FLAGS 0x1Fu
-
 typedef struct lsp_trace_options {
   uint32_t flags; /* LSP_TRACE_* */
   float lod; /* theta: stop at a Line Space once its box's diagonal is under lod * distance; 0: deepest only */
 } lsp_trace_options;
 
-/* Sums over the rays traced. Pass NULL for speed: rays that are counted are traced one by one, see lsp_trace. */
+/* Sums over the rays traced. */
 typedef struct lsp_trace_counts {
   uint64_t rays;
   uint64_t invalid; /* rays with a non-finite component, a zero direction or tmin > tmax: misses */

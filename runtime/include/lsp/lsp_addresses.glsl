@@ -1,13 +1,11 @@
-/* lsp.glsl for scenes with a section larger than the device's maxStorageBufferRange: the sections are read
- * through buffer device addresses, which have no such limit (and were about half as fast on lavapipe).
+/* Of lsp.glsl with LSP_ADDRESSES defined: the sections of a scene through buffer device addresses, for scenes with one
+ * larger than the device's maxStorageBufferRange; addresses have no such limit (and were about half as fast on
+ * lavapipe). The including shader needs besides
  *
- *   #version 460
- *   #extension GL_GOOGLE_include_directive : require
  *   #extension GL_EXT_buffer_reference : require
  *   #extension GL_EXT_buffer_reference_uvec2 : require
- *   #include "lsp/lsp_addresses.glsl"
  *
- * Binding +0 is the header as in lsp.glsl; +1 is a storage buffer of eight 64-bit addresses, those of the sections
+ * Binding +0 is the header as without; +1 is a storage buffer of eight 64-bit addresses, those of the sections
  * of bindings +1 to +8 there (lsp_vulkan_address_table writes it). Nothing else differs.
  *
  * No robustBufferAccess watches over addresses, so every index is checked against the header's counts here,
@@ -16,113 +14,80 @@
 #ifndef LSP_ADDRESSES_GLSL
 #define LSP_ADDRESSES_GLSL
 
-#include "lsp/layout.h"
-
-/* lsp.glsl is taken without the traversal, which follows below with accessors of its own. */
-#ifndef LSP_COUNT
-LspHit lsp_trace_ray(LspRay ray, uint flags, float lod, out bool valid);
-#endif
-#define LSP_TRAVERSE_H
-#include "lsp/lsp.glsl"
-#undef LSP_TRAVERSE_H
-
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer LspWords4 { uvec4 at[]; };
 layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer LspWords2 { uvec2 at[]; };
 layout(buffer_reference, std430, buffer_reference_align = 4) readonly buffer LspWords { uint at[]; };
 
-layout(std430, set = LSP_SET, binding = LSP_FIRST_BINDING + 1) readonly buffer LspAddressBuffer {
-  uvec2 lsp_addresses[8]; /* NODE or GRID, TRIA, NRML, LSPC, BITS, CAND, CELL, REFS */
+/* The table of a scene's addresses. */
+struct LspScene {
+  uvec2 nodes; /* of an NTree: GRID */
+  uvec2 triangles;
+  uvec2 normals;
+  uvec2 line_spaces;
+  uvec2 bit_words;
+  uvec2 candidates;
+  uvec2 cells;
+  uvec2 references;
 };
 
+layout(std430, set = LSP_SET, binding = LSP_FIRST_BINDING + LSP_BINDING_NODES) readonly buffer LspAddressBuffer {
+  LspScene lsp_addresses;
+};
+
+/* The scene whose table is bound. */
+LspScene lsp_bound_scene() { return lsp_addresses; }
+
 #ifdef LSP_NTREE
-LspBitWord lsp_fetch_grid(uint i) {
+LspBitWord lsp_load_grid(LspScene scene, uint i) {
   uint count = lsp_header.node_count * LSP_GRID_WORDS(lsp_header.ntree_branching);
   if (i >= count) return LspBitWord(0u, 0u);
-  uvec2 w = LspWords2(lsp_addresses[0]).at[i];
+  uvec2 w = LspWords2(scene.nodes).at[i];
   return LspBitWord(w.x, w.y);
 }
 
-LspCell lsp_fetch_cell(uint i) {
+LspCell lsp_load_cell(LspScene scene, uint i) {
   if (i >= lsp_header.cell_count) return LspCell(0u, 0u, 0u);
-  LspWords words = LspWords(lsp_addresses[6]);
+  LspWords words = LspWords(scene.cells);
   return LspCell(words.at[3u * i], words.at[3u * i + 1u], words.at[3u * i + 2u]);
 }
 
-uint lsp_fetch_reference(uint i) {
-  return i < lsp_header.reference_count ? LspWords(lsp_addresses[7]).at[i] : 0u;
+uint lsp_load_reference(LspScene scene, uint i) {
+  return i < lsp_header.reference_count ? LspWords(scene.references).at[i] : 0u;
 }
-
-#undef LSP_GRID
-#undef LSP_CELL
-#undef LSP_REFERENCE
-#define LSP_GRID(i) lsp_fetch_grid(i)
-#define LSP_CELL(i) lsp_fetch_cell(i)
-#define LSP_REFERENCE(i) lsp_fetch_reference(i)
 #else
-LspNode lsp_fetch_node(uint i) {
-  if (i >= lsp_header.node_count) return LspNode(vec3(0.0), 0u, vec3(0.0), 0u, vec3(0.0), 0u, vec3(0.0), 0u);
-  LspWords4 words = LspWords4(lsp_addresses[0]);
-  uvec4 a = words.at[4u * i];
-  uvec4 b = words.at[4u * i + 1u];
-  uvec4 c = words.at[4u * i + 2u];
-  uvec4 d = words.at[4u * i + 3u];
-  return LspNode(uintBitsToFloat(a.xyz), a.w, uintBitsToFloat(b.xyz), b.w, uintBitsToFloat(c.xyz), c.w,
-                 uintBitsToFloat(d.xyz), d.w);
+LspNode lsp_load_node(LspScene scene, uint i) {
+  if (i >= lsp_header.node_count) return lsp_node_of(uvec4(0u), uvec4(0u), uvec4(0u), uvec4(0u));
+  LspWords4 words = LspWords4(scene.nodes);
+  return lsp_node_of(words.at[4u * i], words.at[4u * i + 1u], words.at[4u * i + 2u], words.at[4u * i + 3u]);
 }
-
-#undef LSP_NODE
-#define LSP_NODE(i) lsp_fetch_node(i)
 #endif
 
-LspTriangle lsp_fetch_triangle(uint i) {
-  if (i >= lsp_header.triangle_count) return LspTriangle(vec3(0.0), 0u, vec3(0.0), 0u, vec3(0.0), 0u);
-  LspWords4 words = LspWords4(lsp_addresses[1]);
-  uvec4 a = words.at[3u * i];
-  uvec4 b = words.at[3u * i + 1u];
-  uvec4 c = words.at[3u * i + 2u];
-  return LspTriangle(uintBitsToFloat(a.xyz), a.w, uintBitsToFloat(b.xyz), b.w, uintBitsToFloat(c.xyz), c.w);
+LspTriangle lsp_load_triangle(LspScene scene, uint i) {
+  if (i >= lsp_header.triangle_count) return lsp_triangle_of(uvec4(0u), uvec4(0u), uvec4(0u));
+  LspWords4 words = LspWords4(scene.triangles);
+  return lsp_triangle_of(words.at[3u * i], words.at[3u * i + 1u], words.at[3u * i + 2u]);
 }
 
-LspCornerNormals lsp_fetch_normals(uint i) {
+LspCornerNormals lsp_load_normals(LspScene scene, uint i) {
   if (i >= lsp_header.triangle_count) return LspCornerNormals(0u, 0u, 0u);
-  LspWords words = LspWords(lsp_addresses[2]);
+  LspWords words = LspWords(scene.normals);
   return LspCornerNormals(words.at[3u * i], words.at[3u * i + 1u], words.at[3u * i + 2u]);
 }
 
-LspLineSpace lsp_fetch_line_space(uint i) {
-  if (i >= lsp_header.line_space_count) {
-    return LspLineSpace(vec3(0.0), 0u, vec3(0.0), 0u, vec3(0.0), 0u, 0u, 0u, 0u, 0u);
-  }
-  LspWords4 words = LspWords4(lsp_addresses[3]);
-  uvec4 a = words.at[4u * i];
-  uvec4 b = words.at[4u * i + 1u];
-  uvec4 c = words.at[4u * i + 2u];
-  uvec4 d = words.at[4u * i + 3u];
-  return LspLineSpace(uintBitsToFloat(a.xyz), a.w, uintBitsToFloat(b.xyz), b.w, uintBitsToFloat(c.xyz), c.w, d.x,
-                      d.y, d.z, d.w);
+LspLineSpace lsp_load_line_space(LspScene scene, uint i) {
+  if (i >= lsp_header.line_space_count) return lsp_line_space_of(uvec4(0u), uvec4(0u), uvec4(0u), uvec4(0u));
+  LspWords4 words = LspWords4(scene.line_spaces);
+  return lsp_line_space_of(words.at[4u * i], words.at[4u * i + 1u], words.at[4u * i + 2u], words.at[4u * i + 3u]);
 }
 
-LspBitWord lsp_fetch_bit_word(uint i) {
+LspBitWord lsp_load_bit_word(LspScene scene, uint i) {
   if (i >= lsp_header.bit_word_count) return LspBitWord(0u, 0u);
-  uvec2 w = LspWords2(lsp_addresses[4]).at[i];
+  uvec2 w = LspWords2(scene.bit_words).at[i];
   return LspBitWord(w.x, w.y);
 }
 
-uint lsp_fetch_candidate(uint i) {
-  return i < lsp_header.candidate_word_count ? LspWords(lsp_addresses[5]).at[i] : 0u;
+uint lsp_load_candidate(LspScene scene, uint i) {
+  return i < lsp_header.candidate_word_count ? LspWords(scene.candidates).at[i] : 0u;
 }
-
-#undef LSP_TRIANGLE
-#undef LSP_NORMALS
-#undef LSP_LINE_SPACE
-#undef LSP_BIT_WORD
-#undef LSP_CANDIDATE
-#define LSP_TRIANGLE(i) lsp_fetch_triangle(i)
-#define LSP_NORMALS(i) lsp_fetch_normals(i)
-#define LSP_LINE_SPACE(i) lsp_fetch_line_space(i)
-#define LSP_BIT_WORD(i) lsp_fetch_bit_word(i)
-#define LSP_CANDIDATE(i) lsp_fetch_candidate(i)
-
-#include "lsp/traverse.h"
 
 #endif

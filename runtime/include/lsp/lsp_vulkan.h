@@ -10,7 +10,7 @@
  *                                                 +-- upload: copies straight from the mapping, in pieces
  *
  * Shaders: include lsp/lsp.glsl in your own and bind the scene's buffers to bindings 0 to 6, of an NTree to 8
- * (lsp_addresses.glsl where a section is too large for a storage buffer); or use the ready trace shader here,
+ * (LSP_ADDRESSES defined where a section is too large for a storage buffer); or use the ready trace shader here,
  * which reads rays from a buffer and writes hits to another.
  *
  * Files that lsp-validate has not passed: switch robustBufferAccess on. lsp_open has checked the file's
@@ -41,24 +41,6 @@ extern "C" {
 #define LSP_USE_ADDRESSES_IF_NEEDED 0x100u /* where one is larger than max_storage_buffer_range */
 #define LSP_USE_ADDRESSES_ALWAYS 0x200u    /* for tests: descriptors are faster */
 
-/* Bindings of the trace shader's descriptor set, all storage buffers; 0 to 8 are those of lsp.glsl. */
-typedef enum lsp_vulkan_binding {
-  LSP_BINDING_HEADER = 0,
-  LSP_BINDING_NODES = 1, /* of an NTree: GRID */
-  LSP_BINDING_TRIANGLES = 2,
-  LSP_BINDING_NORMALS = 3,
-  LSP_BINDING_LINE_SPACES = 4,
-  LSP_BINDING_BIT_WORDS = 5,
-  LSP_BINDING_CANDIDATES = 6,
-  LSP_BINDING_CELLS = 7,      /* of an NTree */
-  LSP_BINDING_REFERENCES = 8, /* of an NTree */
-  LSP_BINDING_RAYS = 9,       /* LspRay, read */
-  LSP_BINDING_HITS = 10,      /* LspHit, written */
-  LSP_BINDING_COUNTERS = 11,  /* lsp_trace_counts, added to; only the counting shader uses it */
-  LSP_BINDING_COUNT = 12,
-  LSP_BINDING_NONE = 12 /* of MATL's buffer, which the trace shader does not read */
-} lsp_vulkan_binding;
-
 /* The header's, and one a section that binds. */
 enum {
   LSP_VULKAN_MAX_BUFFERS = 1
@@ -76,7 +58,7 @@ typedef struct lsp_vulkan_limits {
 
 /* One buffer of the scene: file bytes [file_offset, file_offset + bytes) as they are. */
 typedef struct lsp_vulkan_buffer {
-  uint32_t binding; /* lsp_vulkan_binding */
+  uint32_t binding; /* LSP_BINDING_* */
   uint32_t section; /* LSP_SECTION_*, 0: the header */
   uint64_t file_offset;
   uint64_t bytes; /* size of the buffer */
@@ -161,25 +143,9 @@ void lsp_vulkan_record_upload_barrier(const lsp_vulkan_functions* functions, VkC
 /* ---- the trace shader -----------------------------------------------------------------------------------
  */
 
-#define LSP_VULKAN_GROUP_SIZE 64u
-
-/* Specialization constants of the shader, each a uint32_t. Stack: its entries, at least header->max_stack and
- * 1, default 96. Flags: LSP_TRACE_*, default 0; a pipeline does one kind of trace. Parts: what the scene needs of
- * the shader, of several scenes all that any of them needs; default everything. */
-#define LSP_VULKAN_STACK_CONSTANT 0u
-#define LSP_VULKAN_FLAGS_CONSTANT 1u
-#define LSP_VULKAN_PARTS_CONSTANT 2u
-
 /* The parts of the shader that a scene needs: LSP_PART_* of lsp/parts.h. The rest costs time where it is not
  * compiled away; with a part missing that a scene needs its answers are wrong. */
 uint32_t lsp_vulkan_parts(const lsp_scene* scene);
-
-/* Push constants, compute stage, from offset 0: rays [first, first + count) of the buffers. */
-typedef struct lsp_vulkan_trace_constants {
-  float lod; /* as in lsp_trace_options */
-  uint32_t first;
-  uint32_t count;
-} lsp_vulkan_trace_constants;
 
 /* SPIR-V (for Vulkan 1.1) of the trace shader for scenes planned like `plan`, entry point "main"; with `counting`
  * nonzero the one that adds to the counters. Only base_structure and addresses of the plan matter; with addresses
@@ -200,7 +166,6 @@ void lsp_vulkan_write_descriptors(const lsp_vulkan_functions* functions, VkDevic
 /* Plans with addresses: fills the table that the shader reads them from. `buffer_addresses` are those of the
  * plan's buffers in its order, from vkGetBufferDeviceAddress. The engine puts the table into a storage
  * buffer, and after lsp_vulkan_write_descriptors points the set at it with lsp_vulkan_write_address_table. */
-#define LSP_VULKAN_ADDRESS_COUNT 8u
 void lsp_vulkan_address_table(const lsp_vulkan_plan* plan, const VkDeviceAddress* buffer_addresses,
                               VkDeviceAddress table[LSP_VULKAN_ADDRESS_COUNT]);
 void lsp_vulkan_write_address_table(const lsp_vulkan_functions* functions, VkDevice device,

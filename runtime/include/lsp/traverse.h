@@ -1,10 +1,19 @@
 /* Exact and approximate traversal of an .lsp scene, in the common subset of GLSL 4.6 and C++20: of a BVH, or
  * with LSP_NTREE defined of an NTree.
  *
- * lsp.glsl includes this file in shaders, runtime/src/trace_loops.inc in the library: one text, so that both give
- * the same bits. That holds where the compiler contracts nothing (LSP_PRECISE, -ffp-contract=off), rounds
- * division and square root correctly, and evaluates what stands here: min and max are written out because
- * their answers to NaN are not the same everywhere.
+ * lsp.glsl includes this file in shaders, runtime/src/trace_bvh.cpp and its like within a struct, whose members the
+ * functions and the stack then are: one text, so that both give the same bits. That holds where the compiler contracts
+ * nothing (`precise`, -ffp-contract=off), rounds division and square root correctly, and evaluates what stands here:
+ * min and max are written out because their answers to NaN are not the same everywhere.
+ *
+ * The includer has defined LspScene, lsp_load_* and lsp_fetch_* (lsp.glsl, runtime/src/trace_subset.h). There is no
+ * include guard: in C++ a file may hold the text in several structs.
+ *
+ * LSP_FN marks what depends on its arguments alone, LSP_STEP what goes on with lsp_walk and its stack. These are global
+ * in GLSL, where an array or a struct handed to a function is copied, and members in C++. A trace is lsp_setup, lsp_begin, then lsp_advance and what it finds, lsp_test_leaf or the stages of a look-up
+ * (lsp_find_shaft, lsp_find_entry, lsp_candidate, lsp_answer), until it finds nothing, then lsp_end and lsp_finish.
+ * lsp_trace_ready takes these steps one after the other; the library takes those of several rays in turn. A base
+ * structure's own are in its header.
  *
  * Sources. Triangles: Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection", JCGT 2013. Boxes: Ize,
  * "Robust BVH Ray Traversal", JCGT 2013. Line Spaces: Keul, Koss, Mueller, "Fast Indirect Lighting
@@ -20,31 +29,23 @@
  * A box is therefore grown by err = 16 u R + 4 u max|o| on every side, which covers both, and the rounding of
  * o + err itself: no box is missed whose triangle would be hit, however thin the box is.
  */
-#ifndef LSP_TRAVERSE_H
-#define LSP_TRAVERSE_H
-
 #include "lsp/empty_margin.h"
+#include "lsp/interface.h"
 #include "lsp/parts.h"
 
-#define LSP_TRACE_APPROXIMATE_BIT 0x1u
-#define LSP_TRACE_ANY_HIT_BIT 0x2u
-#define LSP_TRACE_NEAR_APPROXIMATE_BIT 0x4u
-#define LSP_TRACE_NEAR_SKIP_BIT 0x8u
-#define LSP_TRACE_SKIP_EMPTY_BIT 0x10u
+#ifndef GL_core_profile
+#define precise
+#endif
 
 /* The parts compiled in. */
 #ifndef LSP_PARTS
 #define LSP_PARTS 0xFFFFFFFFu
 #endif
 
-/* LSP_TRACE_NEAR_SKIP_BIT: a surface this close to the origin, in diagonals of the box, is the one the ray
+/* LSP_TRACE_NEAR_SKIP: a surface this close to the origin, in diagonals of the box, is the one the ray
  * starts on. Wrong answers grow with it (bunny, N = 6, D = 9: 0.01 0.48 %, 0.05 0.49 %, 0.15 0.52 %; Sibenik
  * 1.28 %, 1.63 %, 2.62 %), the triangles tested shrink (0.22, 0.13, 0.09 a ray; 0.52, 0.40, 0.25). */
 #define LSP_NEAR_SKIP_REACH 0.01f
-
-/* Set in LspHit.flags when a traversal ended with work left: the device cut a loop short (some give a vector
- * of invocations a budget of iterations), and the answer is not to be trusted. */
-#define LSP_HIT_INCOMPLETE 0x80000000u
 
 /* On the stack a reference to a Line Space is its index with bit 30 set; bit 31 is a leaf's. */
 #define LSP_STACK_LINE_SPACE_BIT 0x40000000u
@@ -55,17 +56,19 @@
 #define LSP_INFINITY uintBitsToFloat(0x7F800000u)
 #define LSP_FLOAT_MAX uintBitsToFloat(0x7F7FFFFFu)
 
+/* The work done; where nobody reads it the compiler leaves it out. */
 struct LspCounts {
   uint nodes;
   uint shafts;
   uint triangles;
 };
 
-#ifdef LSP_COUNT
-#define LSP_COUNT_ADD(field, n) counts.field += (n)
-#else
-#define LSP_COUNT_ADD(field, n)
-#endif
+/* What is asked of the scene. */
+struct LspQuery {
+  uint flags; /* LSP_TRACE_* */
+  float lod;
+  bool far; /* the ray comes from so far away that the base structure treats it apart: lsp_is_far */
+};
 
 /* A ray made ready: t is in lengths of `direction`, which is the given one times 2^-exponent. */
 struct LspSetup {
@@ -82,6 +85,7 @@ struct LspSetup {
   float to_scaled; /* t (scaled) = t (given) * to_scaled */
   float to_given;
   int axis; /* of the largest component of direction */
+  bool valid; /* else nothing but this is set */
 };
 
 /* A hit in the making: the triangle record, its t (scaled) and, of an exact one, the weights of corners 1
@@ -96,7 +100,7 @@ struct LspBest {
 };
 
 /* What a traversal starts from: nothing nearer than tmax. */
-LSP_FN LspBest lsp_no_best(LSP_IN(LspSetup) s) {
+LSP_FN LspBest lsp_no_best(LspSetup s) {
   LspBest best;
   best.t = s.tmax;
   best.u = 0.0f;
@@ -107,16 +111,24 @@ LSP_FN LspBest lsp_no_best(LSP_IN(LspSetup) s) {
   return best;
 }
 
+LSP_FN LspCounts lsp_no_counts() {
+  LspCounts counts;
+  counts.nodes = 0u;
+  counts.shafts = 0u;
+  counts.triangles = 0u;
+  return counts;
+}
+
 LSP_FN float lsp_min(float a, float b) { return b < a ? b : a; }
 LSP_FN float lsp_max(float a, float b) { return a < b ? b : a; }
 
 LSP_FN float lsp_dot(vec3 a, vec3 b) {
-  LSP_PRECISE float r = a.x * b.x + a.y * b.y + a.z * b.z;
+  precise float r = a.x * b.x + a.y * b.y + a.z * b.z;
   return r;
 }
 
 LSP_FN vec3 lsp_cross(vec3 a, vec3 b) {
-  LSP_PRECISE vec3 r = vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
+  precise vec3 r = vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
   return r;
 }
 
@@ -130,7 +142,7 @@ LSP_FN bool lsp_all_finite(vec3 v) { return lsp_is_finite(v.x) && lsp_is_finite(
 LSP_FN float lsp_no_trifle(float d) { return abs(d) < 8.6736174e-19f ? 0.0f : d; }
 
 LSP_FN float lsp_reciprocal(float d) {
-  LSP_PRECISE float r = 1.0f / (d == 0.0f ? 1.0f : d);
+  precise float r = 1.0f / (d == 0.0f ? 1.0f : d);
   return d == 0.0f ? 1.2089258e24f : r;
 }
 
@@ -139,18 +151,20 @@ LSP_FN vec3 lsp_rotate(vec3 v, int axis) {
   return axis == 2 ? v : (axis == 0 ? vec3(v.y, v.z, v.x) : vec3(v.z, v.x, v.y));
 }
 
-/* False: an invalid ray (a NaN anywhere, a non-finite origin or direction, a direction of zero or of
- * denormal length, tmin > tmax); `s` is then not set. */
-LSP_FN bool lsp_setup(LSP_SCENE_ LspRay ray, LSP_OUT(LspSetup) s) {
-  vec3 o = LSP_LOAD3(ray.origin);
-  vec3 d = LSP_LOAD3(ray.direction);
-  if (!lsp_all_finite(o) || !lsp_all_finite(d)) return false;
-  if (lsp_is_nan(ray.tmin) || lsp_is_nan(ray.tmax) || ray.tmin > ray.tmax) return false;
+/* Invalid are a NaN anywhere, a non-finite origin or direction, a direction of zero or of denormal length, and
+ * tmin > tmax. */
+LSP_FN LspSetup lsp_setup(LspScene scene, LspRay ray) {
+  LspSetup s;
+  s.valid = false;
+  vec3 o = lsp_vec3(ray.origin);
+  vec3 d = lsp_vec3(ray.direction);
+  if (!lsp_all_finite(o) || !lsp_all_finite(d)) return s;
+  if (lsp_is_nan(ray.tmin) || lsp_is_nan(ray.tmax) || ray.tmin > ray.tmax) return s;
   vec3 m = abs(d);
   int axis = m.x >= m.y ? (m.x >= m.z ? 0 : 2) : (m.y >= m.z ? 1 : 2);
   float largest = lsp_max(lsp_max(m.x, m.y), m.z);
   uint exponent = floatBitsToUint(largest) >> 23u;
-  if (exponent == 0u) return false;
+  if (exponent == 0u) return s;
   exponent = exponent > 253u ? 253u : exponent;
   float shrink = uintBitsToFloat((254u - exponent) << 23u); /* 2^(127 - exponent) */
   s.to_given = shrink;
@@ -160,43 +174,44 @@ LSP_FN bool lsp_setup(LSP_SCENE_ LspRay ray, LSP_OUT(LspSetup) s) {
   s.direction = vec3(lsp_no_trifle(d.x * shrink), lsp_no_trifle(d.y * shrink), lsp_no_trifle(d.z * shrink));
   s.inverse = vec3(lsp_reciprocal(s.direction.x), lsp_reciprocal(s.direction.y), lsp_reciprocal(s.direction.z));
   /* A step of the denormals inside the interval: what is given back, rounded among them, must lie in it too. */
-  LSP_PRECISE float step = uintBitsToFloat(1u) * s.to_scaled;
-  LSP_PRECISE float first = ray.tmin * s.to_scaled + step;
-  LSP_PRECISE float last = lsp_min(ray.tmax, LSP_FLOAT_MAX) * s.to_scaled - step;
+  precise float step = uintBitsToFloat(1u) * s.to_scaled;
+  precise float first = ray.tmin * s.to_scaled + step;
+  precise float last = lsp_min(ray.tmax, LSP_FLOAT_MAX) * s.to_scaled - step;
   s.tmin = first;
   s.tmax = lsp_min(last, LSP_FLOAT_MAX);
 
-  vec3 lo = abs(LSP_LOAD3(LSP_HEADER.bounds_min) - o);
-  vec3 hi = abs(LSP_LOAD3(LSP_HEADER.bounds_max) - o);
+  vec3 lo = abs(lsp_vec3(lsp_load_header(scene).bounds_min) - o);
+  vec3 hi = abs(lsp_vec3(lsp_load_header(scene).bounds_max) - o);
   float r = lsp_max(lsp_max(lsp_max(lo.x, hi.x), lsp_max(lo.y, hi.y)), lsp_max(lo.z, hi.z));
   float a = lsp_max(lsp_max(abs(o.x), abs(o.y)), abs(o.z));
-  LSP_PRECISE float err = r * 9.5367432e-7f + a * 2.3841858e-7f; /* 16 u r + 4 u a */
+  precise float err = r * 9.5367432e-7f + a * 2.3841858e-7f; /* 16 u r + 4 u a */
   s.err = err;
   s.origin_plus = vec3(o.x + err, o.y + err, o.z + err);
   s.origin_minus = vec3(o.x - err, o.y - err, o.z - err);
 
   vec3 p = lsp_rotate(s.direction, axis);
-  LSP_PRECISE float z = 1.0f / p.z;
-  LSP_PRECISE vec3 shear = vec3(p.x / p.z, p.y / p.z, z);
+  precise float z = 1.0f / p.z;
+  precise vec3 shear = vec3(p.x / p.z, p.y / p.z, z);
   s.shear = shear;
-  LSP_PRECISE float len = sqrt(lsp_dot(s.direction, s.direction));
+  precise float len = sqrt(lsp_dot(s.direction, s.direction));
   s.speed = len;
-  return true;
+  s.valid = true;
+  return s;
 }
 
 /* Where the ray enters the grown box, not before tmin; infinity when it misses. tmax is finite. */
-LSP_FN float lsp_box(LSP_IN(LspSetup) s, vec3 lo, vec3 hi, float tmax) {
-  LSP_PRECISE vec3 a = (lo - s.origin_plus) * s.inverse;
-  LSP_PRECISE vec3 b = (hi - s.origin_minus) * s.inverse;
+LSP_FN float lsp_box(LspSetup s, vec3 lo, vec3 hi, float tmax) {
+  precise vec3 a = (lo - s.origin_plus) * s.inverse;
+  precise vec3 b = (hi - s.origin_minus) * s.inverse;
   float t_in = lsp_max(lsp_max(lsp_min(a.x, b.x), lsp_min(a.y, b.y)), lsp_max(lsp_min(a.z, b.z), s.tmin));
   float t_out = lsp_min(lsp_min(lsp_max(a.x, b.x), lsp_max(a.y, b.y)), lsp_min(lsp_max(a.z, b.z), tmax));
   return t_in <= t_out ? t_in : LSP_INFINITY;
 }
 
 /* Where the ray leaves the grown box, if it hits it. */
-LSP_FN float lsp_box_exit(LSP_IN(LspSetup) s, vec3 lo, vec3 hi) {
-  LSP_PRECISE vec3 a = (lo - s.origin_plus) * s.inverse;
-  LSP_PRECISE vec3 b = (hi - s.origin_minus) * s.inverse;
+LSP_FN float lsp_box_exit(LspSetup s, vec3 lo, vec3 hi) {
+  precise vec3 a = (lo - s.origin_plus) * s.inverse;
+  precise vec3 b = (hi - s.origin_minus) * s.inverse;
   return lsp_min(lsp_min(lsp_max(a.x, b.x), lsp_max(a.y, b.y)), lsp_max(a.z, b.z));
 }
 
@@ -211,15 +226,15 @@ LSP_FN float lsp_largest(vec3 v) {
 #endif
 
 /* Where the ray meets the plane of a triangle that it passes: a, b, c are the corners seen from the origin,
- * the ray's axis last. The corners' own depths averaged by the edge functions would be an error of 5 u R over
+ * the ray's axis last, as in `direction`. The corners' own depths averaged by the edge functions would be an error of 5 u R over
  * the smallest height of the triangle off, however near the hit; the plane is off by what the normal is. That
  * is best at the corner opposite the longest edge: of a needle the other two give a difference of large
  * products. No hit lies outside the depths of the corners, so what a needle can err is bounded by its own
  * extent. Edges are scaled by a power of two (exact): products of three small lengths would underflow. */
-LSP_FN_RARE float lsp_plane_depth(LSP_IN(LspSetup) s, vec3 a, vec3 b, vec3 c) {
-  LSP_PRECISE vec3 ab = b - a;
-  LSP_PRECISE vec3 bc = c - b;
-  LSP_PRECISE vec3 ca = a - c;
+LSP_FN_RARE float lsp_plane_depth(vec3 direction, float shear_z, vec3 a, vec3 b, vec3 c) {
+  precise vec3 ab = b - a;
+  precise vec3 bc = c - b;
+  precise vec3 ca = a - c;
   float length_ab = lsp_largest(ab);
   float length_bc = lsp_largest(bc);
   float length_ca = lsp_largest(ca);
@@ -232,71 +247,72 @@ LSP_FN_RARE float lsp_plane_depth(LSP_IN(LspSetup) s, vec3 a, vec3 b, vec3 c) {
   exponent = exponent < 1u ? 1u : (exponent > 253u ? 253u : exponent);
   float shrink = uintBitsToFloat((254u - exponent) << 23u);
   vec3 n = lsp_cross(e * shrink, f * shrink);
-  LSP_PRECISE float t = lsp_dot(n, p) / lsp_dot(n, lsp_rotate(s.direction, s.axis));
-  LSP_PRECISE vec3 z = vec3(a.z, b.z, c.z) * s.shear.z;
+  precise float t = lsp_dot(n, p) / lsp_dot(n, direction);
+  precise vec3 z = vec3(a.z, b.z, c.z) * shear_z;
   /* In this order a NaN, of a triangle that the ray lies in, becomes the smallest depth. */
   t = lsp_max(lsp_min(lsp_min(z.x, z.y), z.z), t);
   return lsp_min(lsp_max(lsp_max(z.x, z.y), z.z), t);
 }
 
 /* Watertight triangle test (Woop et al. 2013). Keeps a hit nearer than best.t and beyond tmin. */
-LSP_FN void lsp_triangle(LSP_SCENE_ LSP_IN(LspSetup) s, uint index, LSP_INOUT(LspBest) best) {
-  LspTriangle tri = LSP_TRIANGLE(index);
-  vec3 a = lsp_rotate(LSP_LOAD3(tri.v0) - s.origin, s.axis);
-  vec3 b = lsp_rotate(LSP_LOAD3(tri.v1) - s.origin, s.axis);
-  vec3 c = lsp_rotate(LSP_LOAD3(tri.v2) - s.origin, s.axis);
-  LSP_PRECISE float ax = a.x - s.shear.x * a.z;
-  LSP_PRECISE float ay = a.y - s.shear.y * a.z;
-  LSP_PRECISE float bx = b.x - s.shear.x * b.z;
-  LSP_PRECISE float by = b.y - s.shear.y * b.z;
-  LSP_PRECISE float cx = c.x - s.shear.x * c.z;
-  LSP_PRECISE float cy = c.y - s.shear.y * c.z;
-  LSP_PRECISE float u = cx * by - cy * bx;
-  LSP_PRECISE float v = ax * cy - ay * cx;
-  LSP_PRECISE float w = bx * ay - by * ax;
-  if ((u < 0.0f || v < 0.0f || w < 0.0f) && (u > 0.0f || v > 0.0f || w > 0.0f)) return;
-  LSP_PRECISE float det = u + v + w;
-  if (det == 0.0f || !lsp_is_finite(det)) return;
-  float t = lsp_plane_depth(s, a, b, c);
+LSP_FN LspBest lsp_triangle(LspScene scene, LspSetup s, uint index, LspBest best) {
+  LspTriangle tri = lsp_load_triangle(scene, index);
+  vec3 a = lsp_rotate(lsp_vec3(tri.v0) - s.origin, s.axis);
+  vec3 b = lsp_rotate(lsp_vec3(tri.v1) - s.origin, s.axis);
+  vec3 c = lsp_rotate(lsp_vec3(tri.v2) - s.origin, s.axis);
+  precise float ax = a.x - s.shear.x * a.z;
+  precise float ay = a.y - s.shear.y * a.z;
+  precise float bx = b.x - s.shear.x * b.z;
+  precise float by = b.y - s.shear.y * b.z;
+  precise float cx = c.x - s.shear.x * c.z;
+  precise float cy = c.y - s.shear.y * c.z;
+  precise float u = cx * by - cy * bx;
+  precise float v = ax * cy - ay * cx;
+  precise float w = bx * ay - by * ax;
+  if ((u < 0.0f || v < 0.0f || w < 0.0f) && (u > 0.0f || v > 0.0f || w > 0.0f)) return best;
+  precise float det = u + v + w;
+  if (det == 0.0f || !lsp_is_finite(det)) return best;
+  float t = lsp_plane_depth(lsp_rotate(s.direction, s.axis), s.shear.z, a, b, c);
   if (t > s.tmin && t < best.t) {
     best.t = t;
-    LSP_PRECISE float weight1 = v / det; /* not by 1 / det: det may be so small that it is infinite */
-    LSP_PRECISE float weight2 = w / det;
+    precise float weight1 = v / det; /* not by 1 / det: det may be so small that it is infinite */
+    precise float weight2 = w / det;
     best.u = weight1;
     best.v = weight2;
     best.triangle = index;
     best.flags = 0u;
   }
+  return best;
 }
 
 /* Octahedral unit vector of two 16-bit snorm (Cigolle et al. 2014). */
 LSP_FN vec3 lsp_unpack_normal(uint packed) {
   float x = float(int(packed << 16u) >> 16) * (1.0f / 32767.0f);
   float y = float(int(packed) >> 16) * (1.0f / 32767.0f);
-  LSP_PRECISE float z = 1.0f - abs(x) - abs(y);
+  precise float z = 1.0f - abs(x) - abs(y);
   float fold = lsp_max(-z, 0.0f);
-  LSP_PRECISE vec3 n = vec3(x + (x >= 0.0f ? -fold : fold), y + (y >= 0.0f ? -fold : fold), z);
-  LSP_PRECISE float r = 1.0f / sqrt(lsp_dot(n, n));
-  LSP_PRECISE vec3 unit = n * r;
+  precise vec3 n = vec3(x + (x >= 0.0f ? -fold : fold), y + (y >= 0.0f ? -fold : fold), z);
+  precise float r = 1.0f / sqrt(lsp_dot(n, n));
+  precise vec3 unit = n * r;
   return unit;
 }
 
 /* Normal of a point of a triangle's plane by its weights, not normalised. */
-LSP_FN vec3 lsp_interpolated_normal(LSP_SCENE_ uint index, float u, float v) {
-  LspCornerNormals c = LSP_NORMALS(index);
+LSP_FN vec3 lsp_interpolated_normal(LspScene scene, uint index, float u, float v) {
+  LspCornerNormals c = lsp_load_normals(scene, index);
   vec3 n0 = lsp_unpack_normal(c.n0);
   vec3 n1 = lsp_unpack_normal(c.n1);
   vec3 n2 = lsp_unpack_normal(c.n2);
-  LSP_PRECISE vec3 n = n0 * (1.0f - u - v) + n1 * u + n2 * v;
+  precise vec3 n = n0 * (1.0f - u - v) + n1 * u + n2 * v;
   return n;
 }
 
 /* The paper's edge criterion: does the extrapolated normal leave the cone about the triangle's mean normal? */
-LSP_FN bool lsp_leaves_cone(LSP_SCENE_ uint index, float u, float v) {
-  vec3 n = lsp_interpolated_normal(LSP_SCENE_ARG_ index, u, v);
-  vec3 mean = lsp_interpolated_normal(LSP_SCENE_ARG_ index, 0.33333334f, 0.33333334f);
-  LSP_PRECISE float d = lsp_dot(n, mean);
-  LSP_PRECISE float limit = LSP_HEADER.normal_angle_cos * sqrt(lsp_dot(n, n) * lsp_dot(mean, mean));
+LSP_FN bool lsp_leaves_cone(LspScene scene, uint index, float u, float v) {
+  vec3 n = lsp_interpolated_normal(scene, index, u, v);
+  vec3 mean = lsp_interpolated_normal(scene, index, 0.33333334f, 0.33333334f);
+  precise float d = lsp_dot(n, mean);
+  precise float limit = lsp_load_header(scene).normal_angle_cos * sqrt(lsp_dot(n, n) * lsp_dot(mean, mean));
   return d < limit;
 }
 
@@ -311,7 +327,7 @@ struct LspPassage {
 };
 
 LSP_FN uint lsp_patch(vec3 point, vec3 lo, vec3 scale, int axis, uint resolution) {
-  LSP_PRECISE vec3 q = (point - lo) * scale;
+  precise vec3 q = (point - lo) * scale;
   float top = float(resolution) - 0.5f;
   float u = axis == 0 ? q.y : q.x;
   float v = axis == 2 ? q.y : q.z;
@@ -322,11 +338,11 @@ LSP_FN uint lsp_patch(vec3 point, vec3 lo, vec3 scale, int axis, uint resolution
   return uint(u) + resolution * uint(v);
 }
 
-LSP_FN LspPassage lsp_pass(LSP_IN(LspSetup) s, LSP_IN(LspLineSpace) ls) {
-  vec3 lo = LSP_LOAD3(ls.lo);
-  vec3 scale = LSP_LOAD3(ls.scale);
-  LSP_PRECISE vec3 a = (lo - s.origin) * s.inverse;
-  LSP_PRECISE vec3 b = (LSP_LOAD3(ls.hi) - s.origin) * s.inverse;
+LSP_FN LspPassage lsp_pass(LspSetup s, LspLineSpace ls) {
+  vec3 lo = lsp_vec3(ls.lo);
+  vec3 scale = lsp_vec3(ls.scale);
+  precise vec3 a = (lo - s.origin) * s.inverse;
+  precise vec3 b = (lsp_vec3(ls.hi) - s.origin) * s.inverse;
   vec3 near = vec3(lsp_min(a.x, b.x), lsp_min(a.y, b.y), lsp_min(a.z, b.z));
   vec3 far = vec3(lsp_max(a.x, b.x), lsp_max(a.y, b.y), lsp_max(a.z, b.z));
   LspPassage p;
@@ -334,8 +350,8 @@ LSP_FN LspPassage lsp_pass(LSP_IN(LspSetup) s, LSP_IN(LspLineSpace) ls) {
   int axis_out = far.x <= far.y ? (far.x <= far.z ? 0 : 2) : (far.y <= far.z ? 1 : 2);
   p.t_in = lsp_max(lsp_max(near.x, near.y), near.z);
   p.t_out = lsp_min(lsp_min(far.x, far.y), far.z);
-  LSP_PRECISE vec3 point_in = s.origin + s.direction * p.t_in;
-  LSP_PRECISE vec3 point_out = s.origin + s.direction * p.t_out;
+  precise vec3 point_in = s.origin + s.direction * p.t_in;
+  precise vec3 point_out = s.origin + s.direction * p.t_out;
   float sign_in = axis_in == 0 ? s.inverse.x : (axis_in == 1 ? s.inverse.y : s.inverse.z);
   float sign_out = axis_out == 0 ? s.inverse.x : (axis_out == 1 ? s.inverse.y : s.inverse.z);
   uint face_in = 2u * uint(axis_in) + (sign_in < 0.0f ? 1u : 0u);
@@ -357,126 +373,109 @@ LSP_FN LspPassage lsp_pass(LSP_IN(LspSetup) s, LSP_IN(LspLineSpace) ls) {
 }
 
 /* Whether a Line Space has bits alone, no candidates. */
-LSP_FN bool lsp_is_binary(LSP_IN(LspLineSpace) ls) {
+LSP_FN bool lsp_is_binary(LspLineSpace ls) {
   return ((ls.format >> LSP_FORMAT_ENTRY_SHIFT) & LSP_FORMAT_ENTRY_MASK) == 0u;
 }
 
 /* The paper's algorithm 2: the entry of a shaft, LSP_NONE when the shaft is empty. */
-LSP_FN uint lsp_entry(LSP_SCENE_ LSP_IN(LspLineSpace) ls, uint shaft) {
+LSP_FN uint lsp_entry(LspScene scene, LspLineSpace ls, uint shaft) {
   if ((ls.format & LSP_FORMAT_DENSE) != 0u) return shaft;
-  LspBitWord word = LSP_BIT_WORD(ls.word_first + (shaft >> 5u));
+  LspBitWord word = lsp_load_bit_word(scene, ls.word_first + (shaft >> 5u));
   uint bit = shaft & 31u;
   if (((word.bits >> bit) & 1u) == 0u) return LSP_NONE;
   return word.offset + uint(bitCount(word.bits & ((1u << bit) - 1u)));
 }
 
 /* Entries in a word of a Line Space that has candidates are 2^this: 4, 2 or 1, of an invalid file too. */
-LSP_FN uint lsp_entry_pack(LSP_IN(LspLineSpace) ls) {
+LSP_FN uint lsp_entry_pack(LspLineSpace ls) {
   uint bytes = (ls.format >> LSP_FORMAT_ENTRY_SHIFT) & LSP_FORMAT_ENTRY_MASK;
   return bytes == 1u ? 2u : (bytes == 2u ? 1u : 0u);
 }
 
 /* The candidate triangle record of an entry, LSP_NONE when there is none. */
-LSP_FN uint lsp_candidate(LSP_SCENE_ LSP_IN(LspLineSpace) ls, uint entry) {
+LSP_FN uint lsp_candidate(LspScene scene, LspLineSpace ls, uint entry) {
   if (entry == LSP_NONE) return LSP_NONE;
   if (lsp_is_binary(ls)) return ls.triangle_first; /* any triangle stands for all */
   uint pack = lsp_entry_pack(ls);
   uint bits = 32u >> pack;
   uint mask = LSP_NONE >> (32u - bits);
   uint shift = (entry & ((1u << pack) - 1u)) * bits;
-  uint local = (LSP_CANDIDATE(ls.candidate_first + (entry >> pack)) >> shift) & mask;
+  uint local = (lsp_load_candidate(scene, ls.candidate_first + (entry >> pack)) >> shift) & mask;
   local = local == mask && (ls.format & LSP_FORMAT_DENSE) != 0u ? LSP_NONE : local;
   return local == LSP_NONE ? LSP_NONE : ls.triangle_first + local;
 }
 
 /* Weights of corners 1 and 2 at the point of the ray at t, taken to lie in the triangle's plane. */
-LSP_FN vec2 lsp_plane_weights(LSP_IN(LspSetup) s, LSP_IN(LspTriangle) tri, float t) {
-  vec3 v0 = LSP_LOAD3(tri.v0);
-  vec3 e1 = LSP_LOAD3(tri.v1) - v0;
-  vec3 e2 = LSP_LOAD3(tri.v2) - v0;
+LSP_FN vec2 lsp_plane_weights(LspSetup s, LspTriangle tri, float t) {
+  vec3 v0 = lsp_vec3(tri.v0);
+  vec3 e1 = lsp_vec3(tri.v1) - v0;
+  vec3 e2 = lsp_vec3(tri.v2) - v0;
   vec3 n = lsp_cross(e1, e2);
   vec3 w = v0 - s.origin;
-  LSP_PRECISE vec3 r = s.direction * t - w;
-  LSP_PRECISE float scale = 1.0f / lsp_dot(n, n);
-  LSP_PRECISE vec2 weights = vec2(lsp_dot(lsp_cross(r, e2), n) * scale, lsp_dot(lsp_cross(e1, r), n) * scale);
+  precise vec3 r = s.direction * t - w;
+  precise float scale = 1.0f / lsp_dot(n, n);
+  precise vec2 weights = vec2(lsp_dot(lsp_cross(r, e2), n) * scale, lsp_dot(lsp_cross(e1, r), n) * scale);
   return weights;
 }
 
 /* Whether a ray that passes the box of a Line Space may find something there that is nearer than best. */
-LSP_FN bool lsp_may_hit(LSP_IN(LspPassage) pass, LSP_IN(LspBest) best) {
+LSP_FN bool lsp_may_hit(LspPassage pass, LspBest best) {
   return pass.t_in <= pass.t_out && pass.t_in < best.t;
 }
 
 /* The paper's algorithm 1, from the candidate on: it is taken as an infinite plane. A plane hit outside the box by
  * less than the tolerance is moved to the box. */
-LSP_FN void lsp_hit_candidate(LSP_SCENE_ LSP_IN(LspSetup) s, LSP_IN(LspLineSpace) ls, LSP_IN(LspPassage) pass,
-                              uint candidate, LSP_INOUT(LspBest) best) {
+LSP_FN LspBest lsp_hit_candidate(LspScene scene, LspSetup s, LspLineSpace ls, LspPassage pass, uint candidate,
+                                 LspBest best) {
   if ((LSP_PARTS & LSP_PART_BINARY) != 0u && lsp_is_binary(ls)) {
     /* A binary Line Space knows that something is hit, not where: the middle of the passage. */
-    LSP_PRECISE float middle = 0.5f * (lsp_max(pass.t_in, s.tmin) + pass.t_out);
-    if (!(middle > s.tmin && middle < best.t)) return;
+    precise float middle = 0.5f * (lsp_max(pass.t_in, s.tmin) + pass.t_out);
+    if (!(middle > s.tmin && middle < best.t)) return best;
     best.t = middle;
     best.triangle = candidate;
     best.flags = LSP_HIT_LINE_SPACE | (pass.t_in <= s.tmin ? LSP_HIT_ORIGIN_INSIDE : 0u);
-    return;
+    return best;
   }
-  LspTriangle tri = LSP_TRIANGLE(candidate);
-  vec3 v0 = LSP_LOAD3(tri.v0);
-  vec3 e1 = LSP_LOAD3(tri.v1) - v0;
-  vec3 e2 = LSP_LOAD3(tri.v2) - v0;
+  LspTriangle tri = lsp_load_triangle(scene, candidate);
+  vec3 v0 = lsp_vec3(tri.v0);
+  vec3 e1 = lsp_vec3(tri.v1) - v0;
+  vec3 e2 = lsp_vec3(tri.v2) - v0;
   vec3 n = lsp_cross(e1, e2);
   vec3 w = v0 - s.origin;
-  LSP_PRECISE float t = lsp_dot(w, n) / lsp_dot(s.direction, n); /* NaN or infinite along the plane */
+  precise float t = lsp_dot(w, n) / lsp_dot(s.direction, n); /* NaN or infinite along the plane */
   float slack = 0.0f;
-  if ((LSP_PARTS & LSP_PART_PLANE_TOLERANCE) != 0u && LSP_HEADER.plane_tolerance > 0.0f) {
-    vec3 extent = LSP_LOAD3(ls.hi) - LSP_LOAD3(ls.lo);
-    LSP_PRECISE float reach = LSP_HEADER.plane_tolerance * sqrt(lsp_dot(extent, extent)) / s.speed;
+  if ((LSP_PARTS & LSP_PART_PLANE_TOLERANCE) != 0u && lsp_load_header(scene).plane_tolerance > 0.0f) {
+    vec3 extent = lsp_vec3(ls.hi) - lsp_vec3(ls.lo);
+    precise float reach = lsp_load_header(scene).plane_tolerance * sqrt(lsp_dot(extent, extent)) / s.speed;
     slack = reach;
   }
-  if (!(t >= pass.t_in - slack && t <= pass.t_out + slack)) return;
+  if (!(t >= pass.t_in - slack && t <= pass.t_out + slack)) return best;
   t = t < pass.t_in ? pass.t_in : t;
   t = t > pass.t_out ? pass.t_out : t;
-  if (!(t > s.tmin && t < best.t)) return;
-  if ((LSP_PARTS & LSP_PART_NORMAL_ANGLE) != 0u && LSP_HEADER.normal_angle_cos > -1.0f && LSP_HAS_NORMALS &&
+  if (!(t > s.tmin && t < best.t)) return best;
+  if ((LSP_PARTS & LSP_PART_NORMAL_ANGLE) != 0u && lsp_load_header(scene).normal_angle_cos > -1.0f && lsp_has_normals(scene) &&
       (tri.flags & LSP_TRIANGLE_SMOOTH) != 0u) {
     vec2 weights = lsp_plane_weights(s, tri, t);
-    if (lsp_leaves_cone(LSP_SCENE_ARG_ candidate, weights.x, weights.y)) return;
+    if (lsp_leaves_cone(scene, candidate, weights.x, weights.y)) return best;
   }
   best.t = t;
   best.triangle = candidate;
   best.flags = LSP_HIT_LINE_SPACE | (pass.t_in <= s.tmin ? LSP_HIT_ORIGIN_INSIDE : 0u);
-}
-
-/* Answers the ray from a Line Space. */
-LSP_FN void lsp_look_up(LSP_SCENE_ LSP_IN(LspSetup) s, uint index, LSP_INOUT(LspBest) best) {
-  LspLineSpace ls = LSP_LINE_SPACE(index);
-  LspPassage pass = lsp_pass(s, ls);
-  if (!lsp_may_hit(pass, best)) return;
-  uint candidate = lsp_candidate(LSP_SCENE_ARG_ ls, lsp_entry(LSP_SCENE_ARG_ ls, pass.shaft));
-  if (candidate != LSP_NONE) lsp_hit_candidate(LSP_SCENE_ARG_ s, ls, pass, candidate, best);
+  return best;
 }
 
 /* Whether the last surface along the line of a ray that starts inside the box of a Line Space, which the shaft of the
  * opposite direction knows, lies behind the origin or is the one the ray starts on: then nothing is ahead. */
-LSP_FN bool lsp_is_behind(LSP_SCENE_ LSP_IN(LspSetup) s, LSP_IN(LspLineSpace) ls, uint candidate) {
+LSP_FN bool lsp_is_behind(LspScene scene, LspSetup s, LspLineSpace ls, uint candidate) {
   if ((LSP_PARTS & LSP_PART_BINARY) != 0u && lsp_is_binary(ls)) return false;
-  LspTriangle tri = LSP_TRIANGLE(candidate);
-  vec3 v0 = LSP_LOAD3(tri.v0);
-  vec3 n = lsp_cross(LSP_LOAD3(tri.v1) - v0, LSP_LOAD3(tri.v2) - v0);
+  LspTriangle tri = lsp_load_triangle(scene, candidate);
+  vec3 v0 = lsp_vec3(tri.v0);
+  vec3 n = lsp_cross(lsp_vec3(tri.v1) - v0, lsp_vec3(tri.v2) - v0);
   vec3 w = v0 - s.origin;
-  LSP_PRECISE float t = lsp_dot(w, n) / lsp_dot(s.direction, n);
-  vec3 extent = LSP_LOAD3(ls.hi) - LSP_LOAD3(ls.lo);
-  LSP_PRECISE float reach = LSP_NEAR_SKIP_REACH * sqrt(lsp_dot(extent, extent)) / s.speed;
+  precise float t = lsp_dot(w, n) / lsp_dot(s.direction, n);
+  vec3 extent = lsp_vec3(ls.hi) - lsp_vec3(ls.lo);
+  precise float reach = LSP_NEAR_SKIP_REACH * sqrt(lsp_dot(extent, extent)) / s.speed;
   return t <= s.tmin + reach;
-}
-
-/* Whether such a ray leaves the box without meeting anything. */
-LSP_FN bool lsp_leaves_freely(LSP_SCENE_ LSP_IN(LspSetup) s, uint index) {
-  LspLineSpace ls = LSP_LINE_SPACE(index);
-  LspPassage pass = lsp_pass(s, ls);
-  if (pass.t_in > pass.t_out) return false;
-  uint candidate = lsp_candidate(LSP_SCENE_ARG_ ls, lsp_entry(LSP_SCENE_ARG_ ls, pass.reverse));
-  return candidate == LSP_NONE || lsp_is_behind(LSP_SCENE_ARG_ s, ls, candidate);
 }
 
 /* Whether a reference is an inner node's; LSP_NONE has a leaf's bit. */
@@ -485,52 +484,53 @@ LSP_FN bool lsp_is_node(uint ref) { return (ref & (LSP_LEAF_BIT | LSP_STACK_LINE
 /* Whether a reference on the stack asks if the ray leaves a box freely; neither a leaf's nor LSP_NONE does. */
 LSP_FN bool lsp_is_near(uint ref) { return (ref >> 29u) == 3u; }
 
-/* Where to go on from such a reference: LSP_NONE where the ray leaves freely, else what the Line Space stands for. */
-LSP_FN uint lsp_go_on_near(LSP_SCENE_ LSP_IN(LspSetup) s, uint ref) {
-  uint index = ref & LSP_STACK_INDEX_MASK;
-  return lsp_leaves_freely(LSP_SCENE_ARG_ s, index) ? LSP_NONE : LSP_LINE_SPACE(index).child;
-}
+LSP_FN uint lsp_line_space_index(uint ref) { return ref & LSP_STACK_INDEX_MASK; }
 
 /* Whether rounding moves a ray by no more than conservative Line Spaces allow for (lsp/empty_margin.h). */
-LSP_FN bool lsp_may_skip_empty(LSP_SCENE_ LSP_IN(LspSetup) s) {
-  vec3 lo = LSP_LOAD3(LSP_HEADER.bounds_min);
-  vec3 hi = LSP_LOAD3(LSP_HEADER.bounds_max);
-  LSP_PRECISE float limit =
+LSP_FN bool lsp_may_skip_empty(LspScene scene, LspSetup s) {
+  vec3 lo = lsp_vec3(lsp_load_header(scene).bounds_min);
+  vec3 hi = lsp_vec3(lsp_load_header(scene).bounds_max);
+  precise float limit =
       LSP_EMPTY_EXTENT * lsp_largest(hi - lo) + LSP_EMPTY_REACH * lsp_max(lsp_largest(lo), lsp_largest(hi));
   return s.err <= limit;
 }
 
 /* Whether a Line Space proves that the ray, wherever it begins and ends, hits nothing in its node. */
-LSP_FN bool lsp_is_empty(LSP_SCENE_ LSP_IN(LspSetup) s, uint index) {
-  LspLineSpace ls = LSP_LINE_SPACE(index);
+LSP_FN bool lsp_is_empty(LspScene scene, LspSetup s, uint index) {
+  LspLineSpace ls = lsp_load_line_space(scene, index);
   if ((ls.format & LSP_FORMAT_CONSERVATIVE) == 0u || (ls.format & LSP_FORMAT_DENSE) != 0u) return false;
   LspPassage pass = lsp_pass(s, ls);
   if (!(pass.t_in <= pass.t_out)) return false;
-  return ((LSP_BIT_WORD(ls.word_first + (pass.shaft >> 5u)).bits >> (pass.shaft & 31u)) & 1u) == 0u;
+  return ((lsp_load_bit_word(scene, ls.word_first + (pass.shaft >> 5u)).bits >> (pass.shaft & 31u)) & 1u) == 0u;
 }
 
 /* What to visit for a child hit at t_in: itself, or in an approximate trace its Line Space. Look-ups, but for
  * those that skip empty shafts, are left to the caller: a device that runs both sides of every branch would do them
  * for both children of every node. */
-LSP_FN uint lsp_visit(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod, uint child, uint line_space, vec3 lo,
-                      vec3 hi, float t_in LSP_COUNTS_PARAM) {
+LSP_FN uint lsp_visit(LspScene scene, LspSetup s, LspQuery q, uint child, uint line_space, vec3 lo, vec3 hi,
+                      float t_in) {
   if (line_space == LSP_NONE) return child;
-  if ((flags & LSP_TRACE_APPROXIMATE_BIT) == 0u) {
-    if ((flags & LSP_TRACE_SKIP_EMPTY_BIT) == 0u) return child;
-    LSP_COUNT_ADD(shafts, 1u);
-    return lsp_is_empty(LSP_SCENE_ARG_ s, line_space & LSP_LINE_SPACE_MASK) ? LSP_NONE : child;
+  if ((q.flags & LSP_TRACE_APPROXIMATE) == 0u) {
+    if ((q.flags & LSP_TRACE_SKIP_EMPTY) == 0u) return child;
+    return lsp_is_empty(scene, s, line_space & LSP_LINE_SPACE_MASK) ? LSP_NONE : child;
   }
   bool exists = child != LSP_NONE;
-  if (t_in <= s.tmin && (flags & LSP_TRACE_NEAR_APPROXIMATE_BIT) == 0u && exists) {
-    if ((flags & LSP_TRACE_NEAR_SKIP_BIT) == 0u) return child;
+  if (t_in <= s.tmin && (q.flags & LSP_TRACE_NEAR_APPROXIMATE) == 0u && exists) {
+    if ((q.flags & LSP_TRACE_NEAR_SKIP) == 0u) return child;
     return (line_space & LSP_LINE_SPACE_MASK) | LSP_STACK_LINE_SPACE_BIT | LSP_STACK_NEAR_BIT;
   }
   if ((line_space & LSP_TERMINAL_BIT) == 0u && exists) {
     vec3 extent = hi - lo;
-    LSP_PRECISE float reach = lod * t_in * s.speed;
+    precise float reach = q.lod * t_in * s.speed;
     if (!(lsp_dot(extent, extent) < reach * reach)) return child;
   }
   return (line_space & LSP_LINE_SPACE_MASK) | LSP_STACK_LINE_SPACE_BIT;
+}
+
+/* Look-ups that lsp_visit makes. */
+LSP_FN uint lsp_visit_shafts(LspQuery q, uint line_space) {
+  bool skips = (q.flags & (LSP_TRACE_APPROXIMATE | LSP_TRACE_SKIP_EMPTY)) == LSP_TRACE_SKIP_EMPTY;
+  return skips && line_space != LSP_NONE ? 1u : 0u;
 }
 
 #ifdef LSP_NTREE
@@ -539,31 +539,68 @@ LSP_FN uint lsp_visit(LSP_SCENE_ LSP_IN(LspSetup) s, uint flags, float lod, uint
 #include "lsp/bvh.h"
 #endif
 
+/* A look-up is a load after the other, each of which depends on the one before: hence its stages. */
+
+/* Whether lsp_walk.ref asks if the ray leaves the box freely, not what it hits. */
+LSP_STEP bool lsp_asks_near(LspQuery q) {
+  return (q.flags & LSP_TRACE_NEAR_SKIP) != 0u && lsp_is_near(lsp_walk.ref);
+}
+
+LSP_STEP LspPassage lsp_find_shaft(LspSetup s, LspQuery q, LspLineSpace ls) {
+  LspPassage pass = lsp_pass(s, ls);
+  if (lsp_asks_near(q)) pass.shaft = pass.reverse;
+  return pass;
+}
+
+LSP_STEP uint lsp_find_entry(LspScene scene, LspQuery q, LspLineSpace ls, LspPassage pass) {
+  return lsp_asks_near(q) || lsp_may_hit(pass, lsp_walk.best) ? lsp_entry(scene, ls, pass.shaft) : LSP_NONE;
+}
+
+/* A ray that leaves freely is done with the node, one that does not goes on to what the Line Space stands for. */
+LSP_STEP void lsp_answer(LspScene scene, LspSetup s, LspQuery q, LspLineSpace ls, LspPassage pass, uint candidate) {
+  lsp_walk.counts.shafts += 1u;
+  if (lsp_asks_near(q)) {
+    bool freely = pass.t_in <= pass.t_out && (candidate == LSP_NONE || lsp_is_behind(scene, s, ls, candidate));
+    lsp_walk.ref = freely ? LSP_NONE : ls.child;
+    return;
+  }
+  if (candidate != LSP_NONE) lsp_walk.best = lsp_hit_candidate(scene, s, ls, pass, candidate, lsp_walk.best);
+  lsp_walk.ref = LSP_NONE;
+}
+
+LSP_STEP void lsp_look_up(LspScene scene, LspSetup s, LspQuery q) {
+  LspLineSpace ls = lsp_load_line_space(scene, lsp_line_space_index(lsp_walk.ref));
+  LspPassage pass = lsp_find_shaft(s, q, ls);
+  uint entry = lsp_find_entry(scene, q, ls, pass);
+  uint candidate = lsp_candidate(scene, ls, entry);
+  lsp_answer(scene, s, q, ls, pass, candidate);
+}
+
 LSP_FN LspHit lsp_no_hit() {
   LspHit hit;
   hit.t = LSP_INFINITY;
   hit.primitive = LSP_NONE;
   hit.u = 0.0f;
   hit.v = 0.0f;
-  hit.normal = LSP_STORE3(vec3(0.0f, 0.0f, 0.0f));
+  hit.normal = lsp_float3_of(vec3(0.0f, 0.0f, 0.0f));
   hit.flags = 0u;
   return hit;
 }
 
 /* The answer in the caller's terms: t in lengths of the direction given, unit shading normal. */
-LSP_FN LspHit lsp_finish(LSP_SCENE_ LSP_IN(LspSetup) s, LspRay ray, LSP_IN(LspBest) best) {
+LSP_FN LspHit lsp_finish(LspScene scene, LspSetup s, LspRay ray, LspBest best) {
   LspHit hit = lsp_no_hit();
   if (!best.complete) hit.flags = LSP_HIT_INCOMPLETE;
   if (best.triangle == LSP_NONE) return hit;
   float t = best.t * s.to_given;
   if (!(t > ray.tmin && t < ray.tmax)) return hit;
-  LspTriangle tri = LSP_TRIANGLE(best.triangle);
-  vec3 v0 = LSP_LOAD3(tri.v0);
-  vec3 n = lsp_cross(LSP_LOAD3(tri.v1) - v0, LSP_LOAD3(tri.v2) - v0);
+  LspTriangle tri = lsp_load_triangle(scene, best.triangle);
+  vec3 v0 = lsp_vec3(tri.v0);
+  vec3 n = lsp_cross(lsp_vec3(tri.v1) - v0, lsp_vec3(tri.v2) - v0);
   vec2 weights = vec2(best.u, best.v);
   if ((best.flags & LSP_HIT_LINE_SPACE) != 0u) weights = lsp_plane_weights(s, tri, best.t);
-  if (LSP_HAS_NORMALS) {
-    vec3 smooth_n = lsp_interpolated_normal(LSP_SCENE_ARG_ best.triangle, weights.x, weights.y);
+  if (lsp_has_normals(scene)) {
+    vec3 smooth_n = lsp_interpolated_normal(scene, best.triangle, weights.x, weights.y);
     if (lsp_dot(smooth_n, smooth_n) > 1e-12f) n = smooth_n;
   }
   /* A needle may have no area in single precision: then it faces the ray. */
@@ -572,26 +609,65 @@ LSP_FN LspHit lsp_finish(LSP_SCENE_ LSP_IN(LspSetup) s, LspRay ray, LSP_IN(LspBe
   uint exponent = floatBitsToUint(lsp_largest(n)) >> 23u;
   exponent = exponent < 1u ? 1u : (exponent > 253u ? 253u : exponent);
   n = n * uintBitsToFloat((254u - exponent) << 23u);
-  LSP_PRECISE float r = 1.0f / sqrt(lsp_dot(n, n));
-  LSP_PRECISE vec3 unit = n * r;
+  precise float r = 1.0f / sqrt(lsp_dot(n, n));
+  precise vec3 unit = n * r;
   hit.t = t;
   hit.primitive = tri.primitive;
   hit.u = weights.x;
   hit.v = weights.y;
-  hit.normal = LSP_STORE3(unit);
+  hit.normal = lsp_float3_of(unit);
   hit.flags |= best.flags;
   return hit;
 }
 
-/* Traces one ray from the root. lod: see lsp_trace_options. valid is false for an invalid ray, a miss. */
-LSP_FN LspHit lsp_trace_ray(LSP_SCENE_ LspRay ray, uint flags, float lod, LSP_OUT(bool) valid LSP_COUNTS_PARAM) {
-  LspSetup s;
-  valid = lsp_setup(LSP_SCENE_ARG_ ray, s);
-  if (!valid) return lsp_no_hit();
-  if ((flags & LSP_TRACE_SKIP_EMPTY_BIT) != 0u && !lsp_may_skip_empty(LSP_SCENE_ARG_ s))
-    flags &= ~LSP_TRACE_SKIP_EMPTY_BIT;
-  LspBest best = lsp_traverse(LSP_SCENE_ARG_ s, flags, lod LSP_COUNTS_ARG);
-  return lsp_finish(LSP_SCENE_ARG_ s, ray, best);
+struct LspTraced {
+  LspHit hit;
+  LspCounts counts;
+  bool valid; /* else the ray is invalid, a miss */
+};
+
+LSP_FN LspTraced lsp_invalid_ray() {
+  LspTraced traced;
+  traced.hit = lsp_no_hit();
+  traced.counts = lsp_no_counts();
+  traced.valid = false;
+  return traced;
 }
 
+/* Traces a valid ray from the root. */
+LSP_STEP LspTraced lsp_trace_ready(LspScene scene, LspSetup s, LspQuery q, LspRay ray) {
+  if ((q.flags & LSP_TRACE_SKIP_EMPTY) != 0u && !lsp_may_skip_empty(scene, s)) q.flags &= ~LSP_TRACE_SKIP_EMPTY;
+  lsp_begin(scene, s, q);
+  bool going = lsp_walk.ref != LSP_NONE;
+  while (going) {
+    lsp_advance(scene, s, q);
+    if ((lsp_walk.ref & LSP_LEAF_BIT) != 0u) {
+      going = lsp_walk.ref != LSP_NONE;
+      if (going) lsp_test_leaf(scene, s);
+    } else if ((q.flags & LSP_TRACE_APPROXIMATE) != 0u) {
+      lsp_look_up(scene, s, q);
+    } else {
+      lsp_walk.ref = LSP_NONE; /* of a damaged file */
+    }
+  }
+  LspTraced traced;
+  traced.hit = lsp_finish(scene, s, ray, lsp_end());
+  traced.counts = lsp_walk.counts;
+  traced.valid = true;
+  return traced;
+}
+
+/* Traces one ray. flags: LSP_TRACE_*; lod: see lsp_trace_options. */
+LSP_STEP LspTraced lsp_trace_ray(LspScene scene, LspRay ray, uint flags, float lod) {
+  LspSetup s = lsp_setup(scene, ray);
+  if (!s.valid) return lsp_invalid_ray();
+  LspQuery q;
+  q.flags = flags;
+  q.lod = lod;
+  q.far = lsp_is_far(scene, s);
+  return lsp_trace_ready(scene, s, q, ray);
+}
+
+#ifndef GL_core_profile
+#undef precise
 #endif

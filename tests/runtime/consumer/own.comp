@@ -6,4 +6,4 @@
 layout(local_size_x = 1) in;
 layout(std430, set = 0, binding = 7) buffer Answer { LspHit answer; };
 
-void main() { answer = lsp_trace(LspRay(vec3(0.0), 0.0, vec3(0.0, 0.0, 1.0), 1e30), 0u, 0.0); }
+void main() { answer = lsp_trace(lsp_bound_scene(), LspRay(vec3(0.0), 0.0, vec3(0.0, 0.0, 1.0), 1e30), 0u, 0.0); }

@@ -1,0 +1,103 @@
+/* What the program and its shaders tell one another, stated once, for C, C++ and GLSL: rays and hits, what is asked of
+ * a trace, and where the trace shader finds its buffers and numbers. */
+#ifndef LSP_INTERFACE_H
+#define LSP_INTERFACE_H
+
+#include "lsp/layout.h"
+
+/* A ray; t counts in lengths of the direction. A hit needs tmin < t < tmax. */
+LSP_BEGIN(LspRay)
+  LSP_VEC3 origin;
+  LSP_FLOAT tmin;
+  LSP_VEC3 direction;
+  LSP_FLOAT tmax;
+LSP_END(LspRay)
+
+LSP_BEGIN(LspHit)
+  LSP_FLOAT t;        /* infinity: no hit */
+  LSP_UINT primitive; /* in import order; LSP_NONE: no hit */
+  LSP_FLOAT u;        /* weight of corner 1; outside [0, 1] where a plane was extrapolated */
+  LSP_FLOAT v;        /* weight of corner 2 */
+  LSP_VEC3 normal;    /* unit shading normal */
+  LSP_UINT flags;     /* LSP_HIT_* */
+LSP_END(LspHit)
+
+#define LSP_HIT_LINE_SPACE 0x1u    /* answered by a Line Space */
+#define LSP_HIT_ORIGIN_INSIDE 0x2u /* the origin lies inside that Line Space's node */
+
+/* The traversal ended with work left, the answer is not to be trusted. In the library this only happens to files whose
+ * declared bounds are wrong; on a device also where it cuts long loops short (some give a vector of invocations a
+ * budget of iterations). */
+#define LSP_HIT_INCOMPLETE 0x80000000u
+
+/* ---- what is asked of a trace --------------------------------------------------------------------------- */
+
+#define LSP_TRACE_APPROXIMATE 0x1u      /* stop at Line Spaces; without it: exact, down to triangles */
+#define LSP_TRACE_ANY_HIT 0x2u          /* any hit in (tmin, tmax), not the closest */
+#define LSP_TRACE_NEAR_APPROXIMATE 0x4u /* answer from a Line Space even where the origin lies inside it */
+
+/* Where the origin lies inside a Line Space: first ask the shaft of the opposite direction for the last surface
+ * on the ray's line, and trace exactly only when that lies ahead. Saves most of the exact work near the origin
+ * for a small error; ignored with LSP_TRACE_NEAR_APPROXIMATE. */
+#define LSP_TRACE_NEAR_SKIP 0x8u
+
+/* Exact traces: ask conservative Line Spaces (lsp-bake --conservative) first, and leave out a node whose shaft is
+ * proven empty. The answers are the same to the bit, any hit's too; fewer nodes are visited, for a look-up at every
+ * Line Space passed. Does nothing in approximate traces, in files without such Line Spaces, and for rays that begin
+ * further than about two extents from the scene, whose rounding the Line Spaces do not cover. */
+#define LSP_TRACE_SKIP_EMPTY 0x10u
+#define LSP_TRACE_ALL_FLAGS 0x1Fu
+
+/* ---- the trace shader ----------------------------------------------------------------------------------- */
+
+/* Bindings of its descriptor set, all storage buffers; 0 to 8 are those of lsp.glsl. */
+#define LSP_BINDING_HEADER 0
+#define LSP_BINDING_NODES 1 /* of an NTree: GRID; of scenes read through addresses: their table */
+#define LSP_BINDING_TRIANGLES 2
+#define LSP_BINDING_NORMALS 3
+#define LSP_BINDING_LINE_SPACES 4
+#define LSP_BINDING_BIT_WORDS 5
+#define LSP_BINDING_CANDIDATES 6
+#define LSP_BINDING_CELLS 7      /* of an NTree */
+#define LSP_BINDING_REFERENCES 8 /* of an NTree */
+#define LSP_BINDING_RAYS 9       /* LspRay, read */
+#define LSP_BINDING_HITS 10      /* LspHit, written */
+#define LSP_BINDING_COUNTERS 11  /* lsp_trace_counts, added to; only the counting shader uses it */
+#define LSP_BINDING_COUNT 12
+#define LSP_BINDING_NONE 12 /* of MATL's buffer, which the trace shader does not read */
+
+/* Addresses in the table: those of the sections of bindings LSP_BINDING_NODES to LSP_BINDING_REFERENCES. */
+#define LSP_VULKAN_ADDRESS_COUNT 8
+
+/* Rays of a work group, one an invocation. */
+#define LSP_VULKAN_GROUP_SIZE 64
+
+/* Specialization constants of the shader, each a uint32_t. Stack: its entries, at least header->max_stack and
+ * 1, default 96. Flags: LSP_TRACE_*, default 0; a pipeline does one kind of trace. Parts: what the scene needs of
+ * the shader, of several scenes all that any of them needs; default everything. */
+#define LSP_VULKAN_STACK_CONSTANT 0
+#define LSP_VULKAN_FLAGS_CONSTANT 1
+#define LSP_VULKAN_PARTS_CONSTANT 2
+
+/* Push constants, compute stage, from offset 0: rays [first, first + count) of the buffers. */
+LSP_BEGIN(lsp_vulkan_trace_constants)
+  LSP_FLOAT lod; /* as in lsp_trace_options */
+  LSP_UINT first;
+  LSP_UINT count;
+LSP_END(lsp_vulkan_trace_constants)
+
+/* Fields of lsp_trace_counts, which the counting shader adds to; the first, the rays, the host knows. */
+#define LSP_COUNTER_INVALID 1u
+#define LSP_COUNTER_HITS 2u
+#define LSP_COUNTER_NODES 3u
+#define LSP_COUNTER_SHAFTS 4u
+#define LSP_COUNTER_TRIANGLES 5u
+
+#if defined(__cplusplus)
+static_assert(sizeof(LspRay) == 32 && sizeof(LspHit) == 32 && sizeof(lsp_vulkan_trace_constants) == 12);
+#elif !defined(GL_core_profile)
+_Static_assert(sizeof(LspRay) == 32 && sizeof(LspHit) == 32, "as in ray and hit files and in shaders");
+_Static_assert(sizeof(lsp_vulkan_trace_constants) == 12, "as in shaders");
+#endif
+
+#endif /* LSP_INTERFACE_H */
