@@ -14,6 +14,7 @@
 #include "bake.h"
 #include "error.h"
 #include "import/import.h"
+#include "import/source_file.h"
 #include "lsp/command_line.h"
 #include "writer.h"
 
@@ -95,11 +96,23 @@ Json to_json(const MeasuredError& e) {
           {"depth_error_percent_of_diagonal", 100 * e.depth_error}};
 }
 
+// The path of a source relative to the folder of the input that led to it.
+std::string name_beside(const std::filesystem::path& file, const std::filesystem::path& input) {
+  const std::filesystem::path folder = input.parent_path();
+  const std::filesystem::path relative = folder.empty() ? file : file.lexically_relative(folder);
+  return printable((relative.empty() ? file : relative).generic_string());
+}
+
 // Provenance: nothing in it depends on the machine, the time, the threads or the folder.
 Json provenance(const Arguments& a, const Mesh& mesh, const std::array<uint64_t, 2>& source,
                 const MeasuredError& error) {
   Json inputs = Json::array();
-  for (const auto& p : a.inputs) inputs.push_back(p.filename().string());
+  for (const auto& p : a.inputs) inputs.push_back(printable(p.filename().string()));
+  Json sources = Json::array();
+  for (const auto& files : mesh.sources) {
+    Json& list = sources.emplace_back(Json::array());
+    for (const auto& file : files) list.push_back(name_beside(file, files[0]));
+  }
   Json materials = Json::array();
   for (const Material& m : mesh.materials) materials.push_back(m.name);
   static const std::map<Purpose, const char*> kPurposes = {{Purpose::kVisibility, "visibility"},
@@ -109,6 +122,7 @@ Json provenance(const Arguments& a, const Mesh& mesh, const std::array<uint64_t,
                                                            {Purpose::kAll, "all"}};
   return {{"generator", std::string("lsp-bake ") + kProgramVersion},
           {"inputs", inputs},
+          {"sources", sources},
           {"source_hash", hex128(source[0], source[1])},
           {"options",
            {{"base", a.base},
@@ -177,7 +191,7 @@ Exit run(Arguments a) {
   import_options.memory_limit = a.memory_limit;
   import_options.crease_angle_degrees = a.crease_angle;
   const Mesh mesh = import_meshes(a.inputs, import_options);
-  const auto source = hash_inputs(a.inputs);
+  const auto source = hash_sources(mesh);
   const double import_seconds = timer();
 
   BakeOptions options;

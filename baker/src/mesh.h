@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <glm/glm.hpp>
 #include <string>
 #include <vector>
@@ -36,6 +37,8 @@ struct Mesh {
   uint64_t primitive_count = 0;                   // triangles in import order, rejected ones included
   Rejected rejected;                              // triangles.size() + rejected.total() = primitive_count
   std::vector<std::string> notes;                 // what was skipped or assumed, for the report
+  // Per input: itself, and after it every file beside it whose content is in the mesh.
+  std::vector<std::vector<std::filesystem::path>> sources;
 };
 
 }  // namespace lsp

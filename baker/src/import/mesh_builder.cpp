@@ -3,6 +3,7 @@
 #include <sys/random.h>
 #include <xxhash.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstring>
@@ -65,6 +66,13 @@ uint64_t MeshBuilder::allocated_bytes() const {
   return bytes(mesh_.positions) + bytes(mesh_.triangles) + bytes(mesh_.primitives) + bytes(mesh_.normals) +
          bytes(mesh_.material_ids) + 2 * bytes(mesh_.materials) + bytes(slots_) + bytes(welded_) +
          bytes(unsmooth_);
+}
+
+void MeshBuilder::add_source(const std::filesystem::path& path) {
+  std::vector<std::filesystem::path>& list = mesh_.sources.back();
+  if (std::find(list.begin(), list.end(), path) != list.end()) return;
+  budget_.charge(path.string(), 256 + path.native().size());
+  list.push_back(path);
 }
 
 void MeshBuilder::begin(const std::string& file, std::span<const glm::vec3> positions,

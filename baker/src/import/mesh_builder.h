@@ -1,6 +1,7 @@
 // Collects triangles of all inputs into one Mesh: counts, rejects, welds, and completes normals.
 #pragma once
 
+#include <filesystem>
 #include <glm/glm.hpp>
 #include <limits>
 #include <set>
@@ -25,6 +26,10 @@ enum class MissingNormals {
 class MeshBuilder {
  public:
   MeshBuilder(Budget& budget, float crease_angle_degrees);
+
+  // Starts an input file; `add_source` names a further one that it led to.
+  void begin_input(const std::filesystem::path& path) { mesh_.sources.push_back({path}); }
+  void add_source(const std::filesystem::path& path);
 
   // Starts a group of triangles that index `positions` (which must outlive the group); `file` names it in
   // errors and notes, `triangle_count` is what it will add (charged to the budget at once).

@@ -133,6 +133,7 @@ class ObjReader {
       std::error_code error;
       if (!std::filesystem::is_regular_file(path, error)) continue;
       read_mtl(path, builder_.budget(), materials);
+      builder_.add_source(path);
       return true;
     }
     return false;

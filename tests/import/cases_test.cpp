@@ -1,0 +1,49 @@
+// Small files as people have them; what is right of each stands in the folder's INDEX.md.
+#include <algorithm>
+
+#include "mesh_files.h"
+
+namespace {
+
+using lsp::Mesh;
+using namespace lsp_test;
+
+class Cases : public ::testing::Test {
+ protected:
+  static Mesh import(const std::string& name) {
+    const std::filesystem::path path = std::filesystem::path(LSP_CASES_DIR) / name;
+    return lsp::import_meshes({&path, 1}, {});
+  }
+  void SetUp() override {
+    if (!std::filesystem::exists(LSP_CASES_DIR)) GTEST_SKIP() << "no cases at " << LSP_CASES_DIR;
+  }
+};
+
+glm::vec3 extent(const Mesh& mesh) {
+  glm::vec3 low = mesh.positions[0], high = low;
+  for (const glm::vec3& p : mesh.positions) low = glm::min(low, p), high = glm::max(high, p);
+  return high - low;
+}
+
+TEST_F(Cases, TheRiggedMeshStandsAsTallAsItIs) {
+  const glm::vec3 size = extent(import("skinned_cm_rig.glb"));
+  EXPECT_NEAR(size.y, 1.8f, 1e-4f);
+  EXPECT_LT(size.x, 4.5f);
+  EXPECT_LT(size.z, 4.5f);
+}
+
+TEST_F(Cases, AMorphedMeshHasItsDefaultWeights) {
+  EXPECT_EQ(extent(import("morph_mesh_weights.glb")), glm::vec3(1, 3, 0));
+}
+
+TEST_F(Cases, ATailAfterTheChunksIsNoDamage) {
+  const Mesh mesh = import("glb_tail_spaces.glb");
+  EXPECT_EQ(mesh.triangles.size(), 12u);
+  EXPECT_TRUE(has_note(mesh, "bytes after its end"));
+}
+
+TEST_F(Cases, ABackslashInAUriIsAPath) {
+  EXPECT_TRUE(has_note(import("uri/backslash.gltf"), "is no valid one"));
+}
+
+}  // namespace
