@@ -1,4 +1,4 @@
-// The mesh between import and the base structure: plain arrays in world space.
+// The mesh between import and the base structure: plain arrays in world space, about an origin.
 #pragma once
 
 #include <array>
@@ -24,13 +24,15 @@ struct Rejected {
   uint64_t degenerate = 0;    // two equal corners, or area below 1e-14 of the longest edge squared
   uint64_t non_finite = 0;    // a corner at infinity or NaN
   uint64_t out_of_range = 0;  // an index beyond the vertices
-  uint64_t total() const { return degenerate + non_finite + out_of_range; }
+  uint64_t collapsed = 0;     // has an area, but none in single precision about the origin
+  uint64_t total() const { return degenerate + non_finite + out_of_range + collapsed; }
 };
 
 struct Mesh {
-  std::vector<glm::vec3> positions;               // world space, welded where the input shares them
-  std::vector<glm::uvec3> triangles;              // indices into positions, all in range
-  std::vector<uint32_t> primitives;               // per triangle: number in import order
+  glm::dvec3 origin{0};               // in the input's space; not 0 only where float32 needs it
+  std::vector<glm::vec3> positions;   // world space less origin, welded where the input shares them
+  std::vector<glm::uvec3> triangles;  // indices into positions, all in range
+  std::vector<uint32_t> primitives;   // per triangle: number in import order
   std::vector<std::array<glm::vec3, 3>> normals;  // per triangle and corner, unit length
   std::vector<uint32_t> material_ids;             // per triangle, index into materials
   std::vector<Material> materials;                // never empty

@@ -46,4 +46,14 @@ TEST_F(Cases, ABackslashInAUriIsAPath) {
   EXPECT_TRUE(has_note(import("uri/backslash.gltf"), "is no valid one"));
 }
 
+TEST_F(Cases, AGeoreferencedHouseKeepsAllItsTriangles) {
+  for (const char* name : {"utm_house.obj", "utm_house_double.ply"}) {
+    const Mesh mesh = import(name);
+    EXPECT_EQ(mesh.triangles.size(), 252u) << name;
+    EXPECT_EQ(mesh.rejected.total(), 0u) << name;
+    EXPECT_GT(glm::length(mesh.origin), 1e5) << name;
+    EXPECT_LT(glm::length(extent(mesh)), 1e3f) << name;
+  }
+}
+
 }  // namespace

@@ -19,16 +19,17 @@ std::vector<float> translation_matrix(float x, float y, float z) {
   return {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, x, y, z, 1};
 }
 
-// A triangle whose corners hang on two joints: the first on joint 0, the second on joint 1, the third on both.
+// A triangle whose corners hang on two joints: the first on joint 0, the second on joint 1, the third on
+// both.
 struct Skinned {
   Document document;
   json attributes;
   explicit Skinned(const std::vector<float>& inverse_bind) {
-    attributes = {{"POSITION", document.vec3(kTriangle)},
-                  {"NORMAL", document.vec3({0, 0, 1, 0, 0, 1, 0, 0, 1})},
-                  {"JOINTS_0", document.values<uint8_t>({0, 9, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0}, kUbyte, "VEC4", 4)},
-                  {"WEIGHTS_0",
-                   document.values<float>({1, 0, 0, 0, 1, 0, 0, 0, 0.5, 0.5, 0, 0}, kFloat, "VEC4", 4)}};
+    attributes = {
+        {"POSITION", document.vec3(kTriangle)},
+        {"NORMAL", document.vec3({0, 0, 1, 0, 0, 1, 0, 0, 1})},
+        {"JOINTS_0", document.values<uint8_t>({0, 9, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0}, kUbyte, "VEC4", 4)},
+        {"WEIGHTS_0", document.values<float>({1, 0, 0, 0, 1, 0, 0, 0, 0.5, 0.5, 0, 0}, kFloat, "VEC4", 4)}};
     document.root["skins"] = {{{"joints", {1, 2}}}};
     if (!inverse_bind.empty())
       document.root["skins"][0]["inverseBindMatrices"] = document.values(inverse_bind, kFloat, "MAT4", 16);
@@ -62,10 +63,12 @@ TEST_F(GltfPose, WithoutInverseBindMatricesTheyAreOne) {
 TEST_F(GltfPose, SecondSetsOfJointsCount) {
   Skinned skinned({});
   Document& d = skinned.document;
-  skinned.attributes["JOINTS_1"] = d.values<uint16_t>({1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}, kUshort, "VEC4", 4);
+  skinned.attributes["JOINTS_1"] =
+      d.values<uint16_t>({1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}, kUshort, "VEC4", 4);
   skinned.attributes["WEIGHTS_1"] =
       d.values<uint8_t>({255, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}, kUbyte, "VEC4", 4, true);
-  EXPECT_EQ(corner(import(skinned.finish()), 0, 0), glm::vec3(10, 2, 0)) << "two weights of 1 are a half each";
+  EXPECT_EQ(corner(import(skinned.finish()), 0, 0), glm::vec3(10, 2, 0))
+      << "two weights of 1 are a half each";
 }
 
 TEST_F(GltfPose, NormalsTurnWithTheirJointsAndMirrorsFlip) {
@@ -105,11 +108,12 @@ TEST_F(GltfPose, BrokenSkinsAreRefused) {
 
 TEST_F(GltfPose, MorphTargetsMoveByTheMeshsWeightsOrTheNodes) {
   Document document;
-  const int up = document.vec3({0, 0, 1, 0, 0, 1, 0, 0, 1}), right = document.vec3({4, 0, 0, 0, 0, 0, 4, 0, 0});
+  const int up = document.vec3({0, 0, 1, 0, 0, 1, 0, 0, 1}),
+            right = document.vec3({4, 0, 0, 0, 0, 0, 4, 0, 0});
   const int tilt = document.vec3({1, 0, -1, 1, 0, -1, 1, 0, -1});
   const json targets = {{{"POSITION", right}}, {{"POSITION", up}, {"NORMAL", tilt}}};
-  const int mesh = document.mesh({{"attributes", {{"POSITION", document.vec3(kTriangle)}, {"NORMAL", up}}},
-                                  {"targets", targets}});
+  const int mesh = document.mesh(
+      {{"attributes", {{"POSITION", document.vec3(kTriangle)}, {"NORMAL", up}}}, {"targets", targets}});
   document.root["meshes"][0]["weights"] = {0.5, 1};
   document.node({{"mesh", mesh}});
   document.node({{"mesh", mesh}, {"weights", {0, 3}}});

@@ -238,7 +238,8 @@ class GltfReader {
   GltfMaterials materials_;
   GltfSkins skins_;
   std::vector<Extent> extents_;  // of each node with what hangs below it
-  std::vector<glm::vec3> placed_, turned_;
+  std::vector<glm::dvec3> placed_;
+  std::vector<glm::vec3> turned_;
   std::vector<bool> mirrored_;  // per position of a skinned primitive
 };
 

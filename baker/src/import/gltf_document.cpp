@@ -31,8 +31,8 @@ uint32_t word_at(std::string_view bytes, size_t offset) {
   return value;
 }
 
-// A GLB is a header of 12 bytes and chunks of 8 + length bytes, JSON first; anything else is taken as JSON. The
-// header's length ends the chunks; one that cuts through a chunk that is whole is wrong and not believed.
+// A GLB is a header of 12 bytes and chunks of 8 + length bytes, JSON first; anything else is taken as JSON.
+// The header's length ends the chunks; one that cuts through a chunk that is whole is wrong and not believed.
 Container open_container(const std::string& file, std::string_view bytes, std::vector<std::string>& notes) {
   if (bytes.substr(0, 4) != "glTF") {
     if (bytes.substr(0, 3) == "\xEF\xBB\xBF") bytes.remove_prefix(3);

@@ -20,9 +20,9 @@ using Bytes = std::span<const uint8_t>;
 
 struct GltfDocument {
   std::string file;
-  tinygltf::Model model;       // without materials, animations, cameras, extras; no buffer data
-  nlohmann::json looks;        // materials, textures, images and samplers as they are, nothing checked
-  std::vector<Bytes> buffers;  // by glTF index; empty where the file gives no bytes for it
+  tinygltf::Model model;             // without materials, animations, cameras, extras; no buffer data
+  nlohmann::json looks;              // materials, textures, images and samplers as they are, nothing checked
+  std::vector<Bytes> buffers;        // by glTF index; empty where the file gives no bytes for it
   std::vector<std::string> storage;  // what `buffers` points into
   std::vector<std::filesystem::path> sources;  // files beside it that were read
   std::vector<std::string> notes;              // what is not read, or read although it is wrong

@@ -32,7 +32,8 @@ bool read_values(const draco::Mesh& mesh, const draco::PointAttribute& attribute
   for (uint32_t point = 0; point < mesh.num_points(); ++point) {
     const draco::AttributeValueIndex at = attribute.mapped_index(draco::PointIndex(point));
     float value[kComponents];
-    if (at.value() >= attribute.size() || !attribute.ConvertValue<float, kComponents>(at, value)) return false;
+    if (at.value() >= attribute.size() || !attribute.ConvertValue<float, kComponents>(at, value))
+      return false;
     for (int k = 0; k < kComponents; ++k) {
       out[size_t{kComponents} * point + size_t(k)] =
           scale == 1 ? value[k] : std::max(float(value[k] / scale), -1.0f);
@@ -46,8 +47,7 @@ bool read_attribute(const draco::Mesh& mesh, const DracoAttribute& wanted, std::
   const draco::PointAttribute* attribute = mesh.GetAttributeByUniqueId(uint32_t(wanted.id));
   if (!attribute || attribute->num_components() != wanted.components) return false;
   // Draco divides by the largest value itself where its own attribute says so.
-  const double scale =
-      wanted.normalized && !attribute->normalized() ? largest_of(attribute->data_type()) : 1;
+  const double scale = wanted.normalized && !attribute->normalized() ? largest_of(attribute->data_type()) : 1;
   switch (wanted.components) {
     case 2:
       return read_values<2>(mesh, *attribute, scale, out);

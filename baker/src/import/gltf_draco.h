@@ -5,8 +5,8 @@
 
 namespace lsp {
 
-// What is wanted of a compressed attribute. `id` is Draco's unique id, `normalized` what glTF's accessor says of
-// integer values.
+// What is wanted of a compressed attribute. `id` is Draco's unique id, `normalized` what glTF's accessor says
+// of integer values.
 struct DracoAttribute {
   int id = -1;
   int components = 3;

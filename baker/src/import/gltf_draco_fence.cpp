@@ -27,8 +27,8 @@ namespace {
 // Processor time for all primitives of a file: ten times what a hundred million triangles take.
 constexpr rlim_t kSeconds = 120;
 
-// On the pipe, for each primitive: Exit::kDone and its arrays, or another exit code and a text. An array is its
-// number of elements and these.
+// On the pipe, for each primitive: Exit::kDone and its arrays, or another exit code and a text. An array is
+// its number of elements and these.
 struct Answer {
   uint64_t exit = 0;
   uint64_t reason_bytes = 0;
@@ -104,7 +104,8 @@ void limit(int resource, rlim_t value) {
     bool good = write_all(fd, &answer, sizeof answer) && write_all(fd, reason.data(), answer.reason_bytes);
     const auto send = [&](const auto& vector) {
       const uint64_t size = vector.size();
-      good = good && write_all(fd, &size, sizeof size) && write_all(fd, vector.data(), size * sizeof vector[0]);
+      good =
+          good && write_all(fd, &size, sizeof size) && write_all(fd, vector.data(), size * sizeof vector[0]);
     };
     if (!answer.exit) {
       send(mesh.indices);

@@ -10,7 +10,8 @@ namespace lsp {
 
 class GltfMaterials {
  public:
-  GltfMaterials(const GltfDocument& document, MeshBuilder& builder) : document_(document), builder_(builder) {}
+  GltfMaterials(const GltfDocument& document, MeshBuilder& builder)
+      : document_(document), builder_(builder) {}
 
   // The builder's number of a material of the document, made on first use; the default material's where the
   // document has none by that number.

@@ -132,7 +132,8 @@ GltfPrimitive GltfPrimitives::read(const tinygltf::Primitive& source, int mode,
   out.normals = vectors_of(values_of("NORMAL").floats);
   // Every element needs both; a file with fewer normals has lost them.
   if (!out.normals.empty() && out.normals.size() != out.positions.size()) {
-    builder_.note(document_.file + ": a primitive has fewer or more normals than positions, they are not used");
+    builder_.note(document_.file +
+                  ": a primitive has fewer or more normals than positions, they are not used");
     out.normals.clear();
   }
   read_joints(source, out);
@@ -192,7 +193,8 @@ void GltfPrimitives::read_joints(const tinygltf::Primitive& source, GltfPrimitiv
   std::vector<std::vector<float>> joints, weights;
   for (int set = 0; set < 64; ++set) {
     const std::string number = std::to_string(set);
-    Values joint = read_values(source, "JOINTS_" + number, 4), weight = read_values(source, "WEIGHTS_" + number, 4);
+    Values joint = read_values(source, "JOINTS_" + number, 4),
+           weight = read_values(source, "WEIGHTS_" + number, 4);
     if (joint.floats.empty() || weight.floats.empty()) break;
     if (joint.floats.size() != 4 * out.positions.size() || weight.floats.size() != joint.floats.size())
       fail("has more or fewer joints or weights than positions");

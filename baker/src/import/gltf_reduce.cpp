@@ -127,11 +127,13 @@ json reduce_document(const json& from) {
 }
 
 bool is_integer_key(std::string_view key) {
-  constexpr std::string_view kKeys[] = {
-      "scene",      "nodes",  "children", "mesh",   "indices",     "material",     "mode",
-      "_INDICES",   "buffer", "bufferView",  "byteOffset",   "byteLength",
-      "byteStride", "count",  "ROTATION", "SCALE",  "TRANSLATION", "componentType",
-      "skin",       "joints", "inverseBindMatrices"};
+  constexpr std::string_view kKeys[] = {"scene",      "nodes",       "children",
+                                        "mesh",       "indices",     "material",
+                                        "mode",       "_INDICES",    "buffer",
+                                        "bufferView", "byteOffset",  "byteLength",
+                                        "byteStride", "count",       "ROTATION",
+                                        "SCALE",      "TRANSLATION", "componentType",
+                                        "skin",       "joints",      "inverseBindMatrices"};
   return is_read_attribute(key) || std::find(std::begin(kKeys), std::end(kKeys), key) != std::end(kKeys);
 }
 

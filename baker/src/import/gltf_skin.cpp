@@ -86,7 +86,8 @@ const std::vector<glm::dmat4>& GltfSkins::joint_matrices(int skin) {
     const int node = source.joints[joint];
     if (node < 0 || size_t(node) >= parents_.size()) fail("has a skin with a joint that is not there");
     glm::dmat4 bind(1);
-    for (size_t k = 0; k < 16 && !inverse.empty(); ++k) bind[int(k / 4)][int(k % 4)] = inverse[16 * joint + k];
+    for (size_t k = 0; k < 16 && !inverse.empty(); ++k)
+      bind[int(k / 4)][int(k % 4)] = inverse[16 * joint + k];
     at->second.push_back(global_matrix(node) * bind);
   }
   return at->second;

@@ -18,7 +18,7 @@ glm::dmat4 gltf_matrix(const std::vector<double>& translation, const std::vector
 // A matrix applied to positions and normals.
 struct Placement {
   explicit Placement(const glm::dmat4& matrix);
-  glm::vec3 position(const glm::vec3& p) const { return glm::vec3(glm::dvec3(matrix * glm::dvec4(p, 1))); }
+  glm::dvec3 position(const glm::vec3& p) const { return glm::dvec3(matrix * glm::dvec4(p, 1)); }
   // Scaled to its largest component, so that float32 holds the result of any matrix.
   glm::vec3 normal(const glm::vec3& n) const;
 

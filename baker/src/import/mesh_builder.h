@@ -33,7 +33,7 @@ class MeshBuilder {
 
   // Starts a group of triangles that index `positions` (which must outlive the group); `file` names it in
   // errors and notes, `triangle_count` is what it will add (charged to the budget at once).
-  void begin(const std::string& file, std::span<const glm::vec3> positions, uint64_t triangle_count,
+  void begin(const std::string& file, std::span<const glm::dvec3> positions, uint64_t triangle_count,
              MissingNormals missing);
 
   // Counts one triangle, and keeps it unless it is to be rejected. `normals` are the file's at the corners:
@@ -54,11 +54,13 @@ class MeshBuilder {
   // Throws Failure kLimit where `more` triangles would not fit the 32-bit primitive numbers.
   void check_count(const std::string& file, uint64_t more) const;
 
+  // What was counted and noted so far. Positions and origin are there only in what take() returns.
   const Mesh& mesh() const { return mesh_; }
+  // The mesh in single precision, about an origin where that is needed.
   Mesh take();
 
  private:
-  uint32_t weld(const glm::vec3& position);
+  uint32_t weld(const glm::dvec3& position);
   void grow_slots();
   void smooth_missing();
 
@@ -69,10 +71,11 @@ class MeshBuilder {
   uint32_t default_material_ = kNoIndex;
 
   std::string file_;
-  std::span<const glm::vec3> positions_;
+  std::span<const glm::dvec3> positions_;
+  std::vector<glm::dvec3> exact_;  // mesh_.positions before they are rounded
   MissingNormals missing_ = MissingNormals::kFlat;
   std::vector<uint32_t> welded_;    // per position of the group: its index in the mesh, or kNoIndex
-  std::vector<uint32_t> slots_;     // open addressing over mesh_.positions
+  std::vector<uint32_t> slots_;     // open addressing over exact_
   size_t group_begin_ = 0;          // first kept triangle of the group
   std::vector<uint32_t> unsmooth_;  // kept triangles of the group with a corner without a normal
   uint64_t unusable_normals_ = 0;   // of the group: present but zero or not finite

@@ -53,12 +53,11 @@ class ObjReader {
     std::string_view word;
     if (!take_word(line, word)) return;
     if (word == "v") {
-      const glm::vec3 position = read_vector(line);
-      push(soup_.positions, position);
+      push(soup_.positions, read_vector(line));
       std::string_view more;
       colored_ = colored_ || (take_word(line, more) && take_word(line, more));
     } else if (word == "vn") {
-      push(soup_.normals, read_vector(line));
+      push(soup_.normals, glm::vec3(read_vector(line)));
     } else if (word == "f" || word == "fo") {
       read_face(line);
     } else if (word == "usemtl") {
@@ -77,10 +76,10 @@ class ObjReader {
   }
 
   // What is not there is NaN: a vertex that takes part in a face then has the face refused by name.
-  static glm::vec3 read_vector(std::string_view& line) {
-    glm::vec3 vector(std::numeric_limits<float>::quiet_NaN());
+  static glm::dvec3 read_vector(std::string_view& line) {
+    glm::dvec3 vector(std::numeric_limits<double>::quiet_NaN());
     std::string_view word;
-    for (int i = 0; i < 3 && take_word(line, word); ++i) vector[i] = float(number_of(word));
+    for (int i = 0; i < 3 && take_word(line, word); ++i) vector[i] = number_of(word);
     return vector;
   }
 

@@ -122,7 +122,7 @@ class OffReader {
     glm::dvec3 position;
     for (int i = 0; i < 3; ++i) position[i] = number_of(word());
     if (homogeneous_) position /= number_of(word());
-    push(soup_.positions, glm::vec3(position));
+    push(soup_.positions, position);
     if (has_normals_) {
       glm::vec3 normal;
       for (int i = 0; i < 3; ++i) normal[i] = float(number_of(word()));

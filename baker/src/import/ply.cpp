@@ -301,22 +301,23 @@ class PlyReader {
     if (element.count >= kNoIndex - soup_.positions.size()) {
       throw Failure(Exit::kLimit, file_, "holds more than 2^32 - 2 vertices, split the mesh");
     }
-    builder_.budget().charge(file_, element.count, (has_normals_ ? 2 : 1) * sizeof(glm::vec3));
+    builder_.budget().charge(file_, element.count,
+                             sizeof(glm::dvec3) + (has_normals_ ? sizeof(glm::vec3) : 0));
     soup_.positions.reserve(soup_.positions.size() + element.count);
     if (has_normals_) soup_.normals.reserve(soup_.normals.size() + element.count);
     const size_t count = element.properties.size();
     for (uint64_t i = 0; i < element.count; ++i) {
-      glm::vec3 vectors[2] = {};
+      glm::dvec3 vectors[2] = {};
       for (size_t k = 0; k < count; ++k) {
         if (targets[k] < 0) {
           body_.skip(element.properties[k]);
         } else {
-          vectors[targets[k] / 3][targets[k] % 3] = float(body_.number(element.properties[k].type));
+          vectors[targets[k] / 3][targets[k] % 3] = body_.number(element.properties[k].type);
         }
       }
       body_.end_element();
       soup_.positions.push_back(vectors[0]);
-      if (has_normals_) soup_.normals.push_back(vectors[1]);
+      if (has_normals_) soup_.normals.push_back(glm::vec3(vectors[1]));
     }
   }
 

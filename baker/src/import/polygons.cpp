@@ -7,8 +7,8 @@
 namespace lsp {
 namespace {
 
-// Point tests allowed for one file's concave polygons: a second or so.
-constexpr uint64_t kEarWork = 200'000'000;
+// Point tests allowed for one file's concave polygons: seconds.
+constexpr uint64_t kEarWork = 1'000'000'000;
 
 double area2(const glm::dvec2& a, const glm::dvec2& b, const glm::dvec2& c) {
   return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
@@ -20,19 +20,19 @@ void fan(std::span<const uint32_t> ring, std::vector<glm::uvec3>& out) {
 
 // The polygon seen along its normal (Newell's, the sum of the fan's cross products), counter-clockwise. False
 // where it has no area.
-bool project(std::span<const glm::vec3> corners, std::vector<glm::dvec2>& flat) {
-  const glm::dvec3 origin(corners[0]);
+bool project(std::span<const glm::dvec3> corners, std::vector<glm::dvec2>& flat) {
+  const glm::dvec3 origin = corners[0];
   glm::dvec3 normal(0);
   for (size_t i = 2; i < corners.size(); ++i) {
-    normal += glm::cross(glm::dvec3(corners[i - 1]) - origin, glm::dvec3(corners[i]) - origin);
+    normal += glm::cross(corners[i - 1] - origin, corners[i] - origin);
   }
   const glm::dvec3 size = glm::abs(normal);
   const int axis = size.x > size.y ? (size.x > size.z ? 0 : 2) : (size.y > size.z ? 1 : 2);
   if (!(size[axis] > 0) || !std::isfinite(size[axis])) return false;
   const int u = (axis + 1) % 3, v = (axis + 2) % 3;
   flat.clear();
-  for (const glm::vec3& corner : corners) {
-    const glm::dvec3 p = glm::dvec3(corner) - origin;
+  for (const glm::dvec3& corner : corners) {
+    const glm::dvec3 p = corner - origin;
     flat.push_back(normal[axis] > 0 ? glm::dvec2(p[u], p[v]) : glm::dvec2(p[v], p[u]));
   }
   return true;
@@ -43,20 +43,6 @@ bool is_convex(std::span<const glm::dvec2> flat) {
   const size_t n = flat.size();
   for (size_t i = 0; i < n; ++i) {
     if (area2(flat[i], flat[(i + 1) % n], flat[(i + 2) % n]) < 0) return false;
-  }
-  return true;
-}
-
-bool is_ear(std::span<const glm::dvec2> flat, std::span<const uint32_t> ring, size_t i) {
-  const size_t n = ring.size();
-  const glm::dvec2 a = flat[ring[(i + n - 1) % n]], b = flat[ring[i]], c = flat[ring[(i + 1) % n]];
-  if (!(area2(a, b, c) > 0)) return false;
-  for (size_t k = 0; k < n; ++k) {
-    if (k == i || k == (i + 1) % n || k == (i + n - 1) % n) continue;
-    const glm::dvec2 p = flat[ring[k]];
-    // Corners that repeat a position (the bridge to a hole) touch the ear without cutting it.
-    if (p == a || p == b || p == c) continue;
-    if (area2(a, b, p) >= 0 && area2(b, c, p) >= 0 && area2(c, a, p) >= 0) return false;
   }
   return true;
 }
@@ -79,37 +65,24 @@ bool PolygonSoup::end_face(const std::string& file, Budget& budget) {
 
 uint64_t PolygonSoup::triangle_count() const { return corners.size() - 2 * face_ends.size(); }
 
-void triangulate(std::span<const glm::vec3> corners, std::vector<glm::uvec3>& out, uint64_t& work) {
+EarCut triangulate(std::span<const glm::dvec3> corners, std::vector<glm::uvec3>& out, uint64_t& work) {
   static thread_local std::vector<uint32_t> ring;
   static thread_local std::vector<glm::dvec2> flat;
+  static thread_local EarClipper clipper;
   ring.resize(corners.size());
   for (size_t i = 0; i < ring.size(); ++i) ring[i] = uint32_t(i);
-  if (corners.size() < 4 || work == 0 || !project(corners, flat) || is_convex(flat)) return fan(ring, out);
-
-  size_t start = 0;
-  while (ring.size() > 3) {
-    const size_t n = ring.size();
-    size_t tried = 0;
-    for (; tried < n; ++tried) {
-      const size_t i = (start + tried) % n;
-      work = work > n ? work - n : 0;
-      if (work == 0) return fan(ring, out);
-      if (!is_ear(flat, ring, i)) continue;
-      out.push_back({ring[(i + n - 1) % n], ring[i], ring[(i + 1) % n]});
-      ring.erase(ring.begin() + std::ptrdiff_t(i));
-      start = i % ring.size();
-      break;
-    }
-    if (tried == n) break;  // no ear: it crosses itself, or what is left is a line
+  if (corners.size() < 4 || work == 0 || !project(corners, flat) || is_convex(flat)) {
+    fan(ring, out);
+    return work == 0 ? EarCut::kGaveUp : EarCut::kRight;
   }
-  fan(ring, out);
+  return clipper.cut(flat, out, work);
 }
 
 void add_polygons(const std::string& file, const PolygonSoup& soup, MeshBuilder& builder) {
   builder.begin(file, soup.positions, soup.triangle_count(), MissingNormals::kSmooth);
-  std::vector<glm::vec3> polygon;
+  std::vector<glm::dvec3> polygon;
   std::vector<glm::uvec3> cut;
-  uint64_t work = kEarWork;
+  uint64_t work = kEarWork, crossed = 0;
   const auto add = [&](size_t begin, const glm::uvec3& local, uint32_t material) {
     glm::uvec3 triangle;
     glm::vec3 normals[3];
@@ -136,7 +109,7 @@ void add_polygons(const std::string& file, const PolygonSoup& soup, MeshBuilder&
       }
       cut.clear();
       if (usable) {
-        triangulate(polygon, cut, work);
+        crossed += triangulate(polygon, cut, work) == EarCut::kCrossed;
       } else {  // the builder rejects the fan's triangles that touch the missing corner, and keeps the others
         for (uint32_t i = 2; i < end - begin; ++i) cut.push_back({0, i - 1, i});
       }
@@ -148,6 +121,10 @@ void add_polygons(const std::string& file, const PolygonSoup& soup, MeshBuilder&
   if (soup.too_small) {
     builder.note(file + ": " + std::to_string(soup.too_small) +
                  " faces with fewer than three corners hold no triangle");
+  }
+  if (crossed) {
+    builder.note(file + ": " + std::to_string(crossed) +
+                 " polygons cross themselves, their triangles do not fill them exactly");
   }
   if (work == 0) {
     builder.note(file + ": concave polygons are too many or too large to cut well, the last are cut as fans");

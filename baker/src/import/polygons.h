@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "import/ears.h"
 #include "import/mesh_builder.h"
 
 namespace lsp {
@@ -13,7 +14,7 @@ namespace lsp {
 // Faces with any number of corners over shared positions and normals. Indices may be out of range; the
 // builder rejects what refers to nothing.
 struct PolygonSoup {
-  std::vector<glm::vec3> positions;
+  std::vector<glm::dvec3> positions;
   std::vector<glm::vec3> normals;
   std::vector<uint32_t> corners;         // into positions, face after face
   std::vector<uint32_t> corner_normals;  // into normals (kNoIndex: none); empty or as long as corners
@@ -33,8 +34,8 @@ struct PolygonSoup {
 void add_polygons(const std::string& file, const PolygonSoup& soup, MeshBuilder& builder);
 
 // Cuts a polygon into corners.size() - 2 triangles of corner numbers, appended to `out`. Convex polygons (and
-// those that cross themselves, where no cut is right) become a fan from corner 0. `work` is what is left of
-// the number of point tests allowed, so that hostile polygons cost bounded time; at 0 only fans are made.
-void triangulate(std::span<const glm::vec3> corners, std::vector<glm::uvec3>& out, uint64_t& work);
+// those without any area) become a fan from corner 0. `work` is what is left of the number of point tests
+// allowed, so that hostile polygons cost bounded time; at 0 only fans are made.
+EarCut triangulate(std::span<const glm::dvec3> corners, std::vector<glm::uvec3>& out, uint64_t& work);
 
 }  // namespace lsp

@@ -34,7 +34,7 @@ bool looks_ascii(std::string_view bytes) {
 
 void read_binary(const std::string& file, std::string_view bytes, uint32_t count, PolygonSoup& soup,
                  MeshBuilder& builder) {
-  constexpr uint64_t kSoupBytes = 4 * sizeof(glm::vec3) + 7 * sizeof(uint32_t);
+  constexpr uint64_t kSoupBytes = sizeof(glm::vec3) + 3 * sizeof(glm::dvec3) + 7 * sizeof(uint32_t);
   builder.budget().charge(file, count, kSoupBytes);
   soup.positions.reserve(size_t{3} * count);
   soup.corners.reserve(size_t{3} * count);
@@ -46,7 +46,7 @@ void read_binary(const std::string& file, std::string_view bytes, uint32_t count
     std::memcpy(vectors, bytes.data() + kHeaderBytes + i * kTriangleBytes, sizeof vectors);
     for (int k = 1; k < 4; ++k) {
       soup.corners.push_back(uint32_t(soup.positions.size()));
-      soup.positions.push_back(vectors[k]);
+      soup.positions.push_back(glm::dvec3(vectors[k]));
       soup.corner_normals.push_back(uint32_t(i));
     }
     soup.normals.push_back(vectors[0]);
@@ -54,10 +54,10 @@ void read_binary(const std::string& file, std::string_view bytes, uint32_t count
   }
 }
 
-glm::vec3 read_vector(std::string_view line) {
-  glm::vec3 vector(std::numeric_limits<float>::quiet_NaN());
+glm::dvec3 read_vector(std::string_view line) {
+  glm::dvec3 vector(std::numeric_limits<double>::quiet_NaN());
   std::string_view word;
-  for (int i = 0; i < 3 && take_word(line, word); ++i) vector[i] = float(number_of(word));
+  for (int i = 0; i < 3 && take_word(line, word); ++i) vector[i] = number_of(word);
   return vector;
 }
 
@@ -76,7 +76,7 @@ void read_ascii(const std::string& file, std::string_view text, PolygonSoup& sou
     } else if (equals_ignoring_case(word, "facet")) {
       normal = uint32_t(soup.normals.size());
       take_word(line, word);  // "normal"
-      budget.push_back(file, soup.normals, read_vector(line));
+      budget.push_back(file, soup.normals, glm::vec3(read_vector(line)));
     } else if (equals_ignoring_case(word, "endfacet")) {
       soup.end_face(file, budget);
       normal = kNoIndex;
