@@ -51,6 +51,8 @@ struct Arguments {
   bool no_splits = false;
   std::string preset = "balanced";
   double max_error = 0;  // per cent of rays, 0: not asked for
+  bool strict = false;
+  std::filesystem::path depfile;
   bool resolution_given = false, depth_given = false, samples_given = false;
   CommonOptions common;
 };
@@ -103,6 +105,32 @@ std::string name_beside(const std::filesystem::path& file, const std::filesystem
   return printable((relative.empty() ? file : relative).generic_string());
 }
 
+// --strict: what is not read, or not as it stands, is an error.
+[[noreturn]] void refuse_notes(const Mesh& mesh) {
+  for (const std::string& note : mesh.notes) std::fprintf(stderr, "lsp-bake: note: %s\n", note.c_str());
+  throw Failure(Exit::kInvalid, mesh.sources.front().front().string(),
+                "led to " + std::to_string(mesh.notes.size()) +
+                    " notes, which --strict refuses: mend the input or leave out --strict");
+}
+
+// A rule for Make and Ninja: the output depends on every file that was read.
+void write_depfile(const Arguments& a, const Mesh& mesh) {
+  const auto escaped = [](const std::filesystem::path& path) {
+    std::string text;
+    for (const char c : path.string()) {
+      if (c == ' ' || c == '#') text += '\\';
+      if (c == '$') text += '$';
+      text += c;
+    }
+    return text;
+  };
+  std::string rule = escaped(a.output) + ":";
+  for (const auto& files : mesh.sources) {
+    for (const auto& file : files) rule += " \\\n  " + escaped(file);
+  }
+  write_text(a.depfile, rule + "\n");
+}
+
 // Provenance: nothing in it depends on the machine, the time, the threads or the folder.
 Json provenance(const Arguments& a, const Mesh& mesh, const std::array<uint64_t, 2>& source,
                 const MeasuredError& error) {
@@ -146,7 +174,8 @@ Json provenance(const Arguments& a, const Mesh& mesh, const std::array<uint64_t,
             {"kept", mesh.triangles.size()},
             {"degenerate", mesh.rejected.degenerate},
             {"non_finite", mesh.rejected.non_finite},
-            {"out_of_range", mesh.rejected.out_of_range}}},
+            {"out_of_range", mesh.rejected.out_of_range},
+            {"collapsed", mesh.rejected.collapsed}}},
           {"error", to_json(error)},
           {"materials", materials}};
 }
@@ -191,6 +220,7 @@ Exit run(Arguments a) {
   import_options.memory_limit = a.memory_limit;
   import_options.crease_angle_degrees = a.crease_angle;
   const Mesh mesh = import_meshes(a.inputs, import_options);
+  if (a.strict && !mesh.notes.empty()) refuse_notes(mesh);
   const auto source = hash_sources(mesh);
   const double import_seconds = timer();
 
@@ -254,6 +284,7 @@ Exit run(Arguments a) {
   const Json meta = provenance(a, mesh, source, error);
   const Written written =
       write_lsp(a.output, baked, meta.dump(), {a.align, a.compress == "zstd", 12, a.memory_limit});
+  if (!a.depfile.empty()) write_depfile(a, mesh);
   const double write_seconds = timer();
   bar.clear();
 
@@ -289,8 +320,9 @@ Exit run(Arguments a) {
     std::printf("read        %" PRIu64 " triangles, kept %zu\n", mesh.primitive_count, mesh.triangles.size());
     if (mesh.rejected.total())
       std::printf("dropped     %" PRIu64 " degenerate, %" PRIu64 " non-finite, %" PRIu64
-                  " with an index out of range\n",
-                  mesh.rejected.degenerate, mesh.rejected.non_finite, mesh.rejected.out_of_range);
+                  " with an index out of range, %" PRIu64 " too small\n",
+                  mesh.rejected.degenerate, mesh.rejected.non_finite, mesh.rejected.out_of_range,
+                  mesh.rejected.collapsed);
     for (const std::string& note : mesh.notes) std::printf("note        %s\n", note.c_str());
     std::printf("tree        %u nodes, %u triangle records, depth %u\n", baked.header.node_count,
                 baked.header.triangle_count, baked.header.max_depth);
@@ -385,6 +417,8 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0.0f, 1e6f));
   app.add_option("--crease-angle", a.crease_angle, "Smooth normals are made up to this angle, in degrees")
       ->check(CLI::Range(0.0f, 180.0f));
+  app.add_flag("--strict", a.strict, "Refuse, with exit 3, an input that leads to any note");
+  app.add_option("--depfile", a.depfile, "Write a rule for Make and Ninja: OUT.lsp: every file that was read");
   app.add_flag("--no-splits", a.no_splits, "Build the tree without spatial splits");
   add_common_options(app, "lsp-bake", a.common);
   return run_program("lsp-bake", app, argc, argv, [&] {

@@ -54,8 +54,11 @@ Hash128 hash_sources(std::span<const std::filesystem::path> inputs, std::span<co
   };
   for (size_t i = 0; i < inputs.size(); ++i) {
     add(inputs[i]);
-    for (size_t k = 1; i < lists.size() && k < lists[i].size(); ++k)
-      add(inputs[i].parent_path() / lists[i][k]);
+    for (size_t k = 1; i < lists.size() && k < lists[i].size(); ++k) {
+      const std::filesystem::path path = inputs[i].parent_path() / lists[i][k];
+      std::error_code error;
+      if (std::filesystem::is_regular_file(path, error)) add(path);
+    }
   }
   return hasher.digest();
 }

@@ -46,6 +46,14 @@ TEST_F(Cases, ABackslashInAUriIsAPath) {
   EXPECT_TRUE(has_note(import("uri/backslash.gltf"), "is no valid one"));
 }
 
+TEST_F(Cases, AnStlHoldsWhatItHolds) {
+  for (const char* name : {"stl_count0.stl", "stl_solid_count0.stl"}) {
+    const Mesh mesh = import(name);
+    EXPECT_EQ(mesh.triangles.size(), 12u) << name;
+    EXPECT_TRUE(has_note(mesh, "declares 0 triangles and holds 12")) << name;
+  }
+}
+
 TEST_F(Cases, AGeoreferencedHouseKeepsAllItsTriangles) {
   for (const char* name : {"utm_house.obj", "utm_house_double.ply"}) {
     const Mesh mesh = import(name);

@@ -44,6 +44,57 @@ TEST_F(Gltf, ContainersGiveTheSameMesh) {
   }
 }
 
+TEST_F(Gltf, TheHeadersLengthEndsABinaryFileUnlessItIsWrong) {
+  const std::string glb = triangle().glb();
+  const auto with_length = [&](size_t length) {
+    std::string bytes = glb.substr(0, 8);
+    append(bytes, uint32_t(length));
+    return bytes + glb.substr(12);
+  };
+  EXPECT_TRUE(MeshFiles::import("a.glb", glb).notes.empty());
+  for (const std::string& tail : {std::string("   "), std::string(50, ' '), std::string(40, '\xFF')}) {
+    const Mesh mesh = MeshFiles::import("a.glb", glb + tail);
+    EXPECT_EQ(mesh.triangles.size(), 1u);
+    EXPECT_TRUE(has_note(mesh, std::to_string(tail.size()) + " bytes after its end"));
+  }
+  for (const size_t length : {size_t{0}, size_t{12}, glb.size() - 40, glb.size() + 99, size_t{0xFFFFFFFF}}) {
+    const Mesh mesh = MeshFiles::import("a.glb", with_length(length));
+    EXPECT_EQ(mesh.triangles.size(), 1u) << length;
+    EXPECT_TRUE(has_note(mesh, "wrong length")) << length;
+  }
+}
+
+TEST_F(Gltf, UrisAsExportersWriteThem) {
+  Document document = triangle();
+  std::filesystem::create_directory(folder_ / "sub");
+  const json length = document.bytes.size();
+  const auto import_with = [&](const char* name, const char* uri) {
+    write(name, document.bytes);
+    Document external = document;
+    external.root["buffers"] = {{{"byteLength", length}, {"uri", uri}}};
+    external.bytes.clear();
+    return import(external);
+  };
+  EXPECT_TRUE(has_note(import_with("sub/a.bin", "sub\\a.bin"), "read as a path"));
+  EXPECT_TRUE(has_note(import_with("50%25.bin", "50%25.bin"), "read as a path")) << "percent signs not encoded";
+  EXPECT_TRUE(import_with("b c.bin", "b%20c.bin").notes.empty());
+  EXPECT_TRUE(import_with("back\\slash.bin", "back\\slash.bin").notes.empty()) << "such a file may exist";
+}
+
+TEST_F(Gltf, WhatIsNotReadIsNotedOnce) {
+  Document document = triangle();
+  json& attributes = document.root["meshes"][0]["primitives"][0]["attributes"];
+  attributes["_HEAT"] = attributes["COLOR_1"] = attributes["POSITION"];
+  document.root["meshes"][0]["primitives"].push_back({{"attributes", attributes}});
+  document.root["extensionsUsed"] = {"KHR_lights_punctual", "KHR_texture_transform"};
+  document.root["animations"] = {json::object()};
+  const Mesh mesh = import(document);
+  EXPECT_EQ(mesh.notes.size(), 4u);
+  for (const char* part : {"_HEAT", "COLOR_1", "KHR_lights_punctual", "animations"})
+    EXPECT_TRUE(has_note(mesh, part)) << part;
+  EXPECT_TRUE(import(triangle()).notes.empty());
+}
+
 TEST_F(Gltf, IndicesOfEveryWidthAndNone) {
   for (const int type : {0, kUbyte, kUshort, kUint}) {
     Document document;

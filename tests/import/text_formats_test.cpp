@@ -521,10 +521,24 @@ TEST_F(Stl, BinaryEvenWhereItsHeaderSaysSolid) {
   ASSERT_EQ(mesh.triangles.size(), 3u);
   EXPECT_EQ(corner(mesh, 2, 1), glm::vec3(1, 0, 2));
   EXPECT_EQ(mesh.normals[0][0], glm::vec3(0, 0, 1));
-  EXPECT_TRUE(has_note(import("b.stl", binary_stl("", 2, 3)), "after the last triangle"));
-  EXPECT_EQ(refusal("c.stl", binary_stl("", 4, 3)).exit, Exit::kInvalid);
-  EXPECT_EQ(refusal("c.stl", binary_stl("", 0xFFFFFFFF, 3)).exit, Exit::kInvalid);
+  EXPECT_EQ(refusal("c.stl", binary_stl("", 4, 3) + "x").exit, Exit::kInvalid) << "cut short";
   EXPECT_EQ(refusal("c.stl", "short").exit, Exit::kInvalid);
+}
+
+TEST_F(Stl, WrongCountsOverWholeTriangles) {
+  for (const char* header : {"", "solid streamed\nfacet", "SOLID x\n"}) {
+    for (const uint32_t declared : {0u, 2u, 4u, 0xFFFFFFFFu}) {
+      const Mesh mesh = import("a.stl", binary_stl(header, declared, 3));
+      EXPECT_EQ(mesh.triangles.size(), 3u) << header << declared;
+      EXPECT_TRUE(has_note(mesh, "and holds 3"));
+    }
+    EXPECT_TRUE(import("a.stl", binary_stl(header, 3, 3)).notes.empty());
+    EXPECT_EQ(import("a.stl", binary_stl(header, 0, 3) + "xyz").triangles.size(), 3u);
+    const Mesh tail = import("a.stl", binary_stl(header, 3, 3) + std::string(100, '\0'));
+    EXPECT_EQ(tail.primitive_count, 3u) << "zeros are no triangles";
+    EXPECT_TRUE(has_note(tail, "after the last triangle"));
+  }
+  EXPECT_EQ(refusal("a.stl", binary_stl("", 0, 0)).exit, Exit::kInvalid);
 }
 
 TEST_F(Stl, TextWithSeveralSolidsInAnyCase) {

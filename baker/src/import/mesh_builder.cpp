@@ -299,9 +299,14 @@ Mesh MeshBuilder::take() {
     note(text);
   }
   round_positions(exact_, mesh_);
-  if (mesh_.rejected.collapsed) {
-    note(std::to_string(mesh_.rejected.collapsed) +
-         " triangles are too small for single precision in a scene of this size, they are left out");
+  const Rejected& rejected = mesh_.rejected;
+  const std::pair<uint64_t, const char*> left_out[] = {
+      {rejected.degenerate, "have no area"},
+      {rejected.non_finite, "have a corner that is not finite"},
+      {rejected.out_of_range, "refer to vertices that are not there"},
+      {rejected.collapsed, "are too small for single precision in a scene of this size"}};
+  for (const auto& [count, why] : left_out) {
+    if (count) note(std::to_string(count) + " triangles " + why + ", they are left out");
   }
   return std::move(mesh_);
 }
