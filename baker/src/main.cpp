@@ -175,7 +175,8 @@ Json provenance(const Arguments& a, const Mesh& mesh, const std::array<uint64_t,
             {"degenerate", mesh.rejected.degenerate},
             {"non_finite", mesh.rejected.non_finite},
             {"out_of_range", mesh.rejected.out_of_range},
-            {"collapsed", mesh.rejected.collapsed}}},
+            {"collapsed", mesh.rejected.collapsed},
+            {"invisible", mesh.rejected.invisible}}},
           {"error", to_json(error)},
           {"materials", materials}};
 }
@@ -320,9 +321,9 @@ Exit run(Arguments a) {
     std::printf("read        %" PRIu64 " triangles, kept %zu\n", mesh.primitive_count, mesh.triangles.size());
     if (mesh.rejected.total())
       std::printf("dropped     %" PRIu64 " degenerate, %" PRIu64 " non-finite, %" PRIu64
-                  " with an index out of range, %" PRIu64 " too small\n",
+                  " with an index out of range, %" PRIu64 " too small, %" PRIu64 " wholly transparent\n",
                   mesh.rejected.degenerate, mesh.rejected.non_finite, mesh.rejected.out_of_range,
-                  mesh.rejected.collapsed);
+                  mesh.rejected.collapsed, mesh.rejected.invisible);
     for (const std::string& note : mesh.notes) std::printf("note        %s\n", note.c_str());
     std::printf("tree        %u nodes, %u triangle records, depth %u\n", baked.header.node_count,
                 baked.header.triangle_count, baked.header.max_depth);

@@ -10,6 +10,14 @@
 
 namespace lsp {
 
+// What a triangle's material, textures and vertices make of it, by means over its area in linear light.
+struct TriangleColor {
+  glm::vec3 base_color{0.8f};  // of what is solid
+  glm::vec3 emission{0.0f};    // of what is solid
+  float coverage = 1.0f;       // the share of it that is solid, above 0
+  bool operator==(const TriangleColor&) const = default;
+};
+
 struct Material {
   std::string name;
   glm::vec3 base_color{0.8f};  // linear, the factor without textures
@@ -17,6 +25,7 @@ struct Material {
   glm::vec3 emission{0.0f};  // linear radiance
   float roughness = 1.0f;
   float metallic = 0.0f;
+  TriangleColor color() const { return {base_color, emission, opacity}; }
 };
 
 // Why triangles of the input are not in the mesh. No triangle is dropped for any other reason.
@@ -25,7 +34,8 @@ struct Rejected {
   uint64_t non_finite = 0;    // a corner at infinity or NaN
   uint64_t out_of_range = 0;  // an index beyond the vertices
   uint64_t collapsed = 0;     // has an area, but none in single precision about the origin
-  uint64_t total() const { return degenerate + non_finite + out_of_range + collapsed; }
+  uint64_t invisible = 0;     // textures and factors leave nothing of it
+  uint64_t total() const { return degenerate + non_finite + out_of_range + collapsed + invisible; }
 };
 
 struct Mesh {
@@ -36,11 +46,14 @@ struct Mesh {
   std::vector<std::array<glm::vec3, 3>> normals;  // per triangle and corner, unit length
   std::vector<uint32_t> material_ids;             // per triangle, index into materials
   std::vector<Material> materials;                // never empty
+  std::vector<TriangleColor> colors;              // per triangle; empty: each has its material's
   uint64_t primitive_count = 0;                   // triangles in import order, rejected ones included
   Rejected rejected;                              // triangles.size() + rejected.total() = primitive_count
   std::vector<std::string> notes;                 // what was skipped or assumed, for the report
   // Per input: itself, and after it every file beside it whose content is in the mesh.
   std::vector<std::vector<std::filesystem::path>> sources;
+
+  TriangleColor color(size_t t) const { return colors.empty() ? materials[material_ids[t]].color() : colors[t]; }
 };
 
 }  // namespace lsp

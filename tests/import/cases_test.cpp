@@ -54,6 +54,47 @@ TEST_F(Cases, AnStlHoldsWhatItHolds) {
   }
 }
 
+// The colour of the first triangle of a material by that name.
+lsp::TriangleColor color_of_material(const Mesh& mesh, const std::string& material) {
+  for (size_t t = 0; t < mesh.triangles.size(); ++t) {
+    if (mesh.materials[mesh.material_ids[t]].name == material) return mesh.color(t);
+  }
+  ADD_FAILURE() << "no triangle of " << material;
+  return {};
+}
+
+TEST_F(Cases, ATexturedWallHasTheColourOfItsTexels) {
+  const lsp::TriangleColor wall = color_of_material(import("basecolor_texture_red_wall.glb"), "painted");
+  EXPECT_NEAR(wall.base_color.r, 0.515f, 0.003f);
+  EXPECT_NEAR(wall.base_color.g, 0.003f, 0.002f);
+  EXPECT_NEAR(wall.base_color.b, 0.003f, 0.002f);
+}
+
+TEST_F(Cases, ALanternGlowsByTheMeanOfItsTexels) {
+  const Mesh mesh = import("emissive_texture_mostly_black.glb");
+  double sum = 0, area_sum = 0;
+  for (size_t t = 0; t < mesh.triangles.size(); ++t) {
+    if (mesh.materials[mesh.material_ids[t]].name != "lantern") continue;
+    const double area = 0.5 * double(glm::length(glm::cross(corner(mesh, t, 1) - corner(mesh, t, 0),
+                                                            corner(mesh, t, 2) - corner(mesh, t, 0))));
+    sum += area * double(mesh.color(t).emission.r);
+    area_sum += area;
+  }
+  EXPECT_NEAR(sum / area_sum, 1.0 / 64, 1e-4);
+}
+
+TEST_F(Cases, MaskedAndBlendedTrianglesAreThereInPart) {
+  const Mesh card = import("alpha_mask_card.glb"), glass = import("alpha_blend_glass.glb");
+  double sum = 0, count = 0;
+  for (size_t t = 0; t < card.triangles.size(); ++t) {
+    if (card.materials[card.material_ids[t]].name != "leaf") continue;
+    sum += double(card.color(t).coverage);
+    ++count;
+  }
+  EXPECT_NEAR(sum / count, 0.25, 1e-3);
+  EXPECT_NEAR(color_of_material(glass, "leaf").coverage, 0.1f, 1e-6f);
+}
+
 TEST_F(Cases, AGeoreferencedHouseKeepsAllItsTriangles) {
   for (const char* name : {"utm_house.obj", "utm_house_double.ply"}) {
     const Mesh mesh = import(name);

@@ -20,8 +20,9 @@ class GltfReader {
         document_(read_gltf_document(path, builder.budget())),
         model_(document_->model),
         accessors_(*document_, builder.budget()),
-        primitives_(*document_, accessors_, builder),
-        materials_(*document_, builder),
+        path_(path),
+        materials_(path_, *document_, accessors_, builder),
+        primitives_(*document_, accessors_, materials_, builder),
         skins_(*document_, accessors_) {}
 
   void read() {
@@ -203,7 +204,6 @@ class GltfReader {
       for (size_t i = 0; i < turned_.size(); ++i) turned_[i] = placement.normal(primitive.normals[i]);
     }
 
-    const uint32_t material = materials_.at(primitive.material);
     builder_.begin(document_->file, placed_, primitive.indices.size() / 3, MissingNormals::kFlat);
     for (size_t i = 0; i + 2 < primitive.indices.size(); i += 3) {
       glm::uvec3 corners(primitive.indices[i], primitive.indices[i + 1], primitive.indices[i + 2]);
@@ -213,7 +213,8 @@ class GltfReader {
       const bool has_normals =
           corners.x < turned_.size() && corners.y < turned_.size() && corners.z < turned_.size();
       for (int k = 0; k < 3 && has_normals; ++k) normals[k] = turned_[corners[k]];
-      builder_.add(corners, has_normals ? normals : nullptr, material);
+      builder_.add(corners, has_normals ? normals : nullptr, primitive.material,
+                   primitive.colors.empty() ? nullptr : &primitive.colors[i / 3]);
     }
     builder_.end();
   }
@@ -234,8 +235,9 @@ class GltfReader {
   const std::unique_ptr<GltfDocument> document_;
   const tinygltf::Model& model_;
   GltfAccessors accessors_;
-  GltfPrimitives primitives_;
+  const std::filesystem::path path_;
   GltfMaterials materials_;
+  GltfPrimitives primitives_;
   GltfSkins skins_;
   std::vector<Extent> extents_;  // of each node with what hangs below it
   std::vector<glm::dvec3> placed_;

@@ -66,8 +66,9 @@ void drop_unused(GltfPrimitive& primitive) {
 
 }  // namespace
 
-GltfPrimitives::GltfPrimitives(const GltfDocument& document, GltfAccessors& accessors, MeshBuilder& builder)
-    : document_(document), accessors_(accessors), builder_(builder) {
+GltfPrimitives::GltfPrimitives(const GltfDocument& document, GltfAccessors& accessors,
+                               GltfMaterials& materials, MeshBuilder& builder)
+    : document_(document), accessors_(accessors), materials_(materials), builder_(builder) {
   decode_all_draco();
 }
 
@@ -122,7 +123,6 @@ int GltfPrimitives::components_of(const std::string& name, int accessor) const {
 GltfPrimitive GltfPrimitives::read(const tinygltf::Primitive& source, int mode,
                                    const std::vector<double>& weights) {
   GltfPrimitive out;
-  out.material = source.material >= 0 ? uint32_t(source.material) : kNoIndex;
   const auto values_of = [&](const char* name) {
     Values values = read_values(source, name, 0);
     morph(source, name, weights, values);
@@ -153,6 +153,7 @@ GltfPrimitive GltfPrimitives::read(const tinygltf::Primitive& source, int mode,
     builder_.budget().charge(document_.file, vertices.size(), 3 * sizeof(uint32_t));
     out.indices = expand(std::move(vertices), mode);
   }
+  read_colors(source, weights, out);
   if (decoded != decoded_.end() && source.targets.empty()) decoded_.erase(decoded);  // it is not read again
   if (out.positions.size() > out.indices.size()) drop_unused(out);
   return out;
@@ -186,6 +187,49 @@ void GltfPrimitives::morph(const tinygltf::Primitive& source, const std::string&
     for (size_t k = 0; k < moves.size(); ++k)
       values.floats[k] = float(double(values.floats[k]) + weights[i] * double(moves[k]));
   }
+}
+
+// The material and, where textures or vertices make one, each triangle's colour.
+void GltfPrimitives::read_colors(const tinygltf::Primitive& source, const std::vector<double>& weights,
+                                 GltfPrimitive& out) {
+  const GltfMaterials::Entry& entry =
+      materials_.at(source.material >= 0 ? uint32_t(source.material) : kNoIndex);
+  out.material = entry.id;
+  const auto values_of = [&](const std::string& name) {
+    Values values = read_values(source, name, 0);
+    morph(source, name, weights, values);
+    return values;
+  };
+  const Values colors = values_of("COLOR_0");
+  const bool colored = std::any_of(colors.floats.begin(), colors.floats.end(), [](float x) { return x != 1; });
+  const Surface& surface = entry.surface;
+  if (!surface.has_textures() && !colored) return;
+  const auto coordinates = [&](const TextureUse& use) {
+    if (!use.texture) return std::vector<float>();
+    const std::string name = "TEXCOORD_" + std::to_string(use.set);
+    Values values = values_of(name);
+    if (values.floats.empty())
+      builder_.note(document_.file + ": a primitive has a texture and no " + name + ", its corner texel holds");
+    return std::move(values.floats);
+  };
+  const std::vector<float> base = coordinates(surface.base), glow = coordinates(surface.glow);
+  const size_t count = out.indices.size() / 3;
+  builder_.budget().charge(document_.file, count, sizeof(TriangleColor));
+  const auto place = [](const TextureUse& use, const std::vector<float>& list, size_t i) {
+    const bool there = 2 * i + 1 < list.size();
+    return use.place(there ? glm::dvec2(list[2 * i], list[2 * i + 1]) : glm::dvec2(0));
+  };
+  out.colors = mean_colors(surface, count, [&](size_t t, SurfaceCorner(&corners)[3]) {
+    for (size_t k = 0; k < 3; ++k) {
+      const size_t i = out.indices[3 * t + k], each = size_t(colors.components);
+      corners[k].base_uv = place(surface.base, base, i);
+      corners[k].glow_uv = place(surface.glow, glow, i);
+      corners[k].color = glm::vec4(1);
+      for (size_t c = 0; c < each && (i + 1) * each <= colors.floats.size(); ++c)
+        corners[k].color[int(c)] = std::clamp(colors.floats[i * each + c], 0.0f, 1.0f);
+    }
+  });
+  materials_.trim();
 }
 
 // All sets of joints and weights, side by side for each position.

@@ -7,6 +7,7 @@
 
 #include "import/gltf_accessor.h"
 #include "import/gltf_draco.h"
+#include "import/gltf_materials.h"
 #include "import/mesh_builder.h"
 
 namespace lsp {
@@ -15,7 +16,8 @@ struct GltfPrimitive {
   std::vector<glm::vec3> positions;
   std::vector<glm::vec3> normals;  // empty or one a position
   std::vector<uint32_t> indices;   // three a triangle; those that refer to nothing may be any number
-  uint32_t material = kNoIndex;    // the document's
+  uint32_t material = 0;           // the builder's
+  std::vector<TriangleColor> colors;  // one a triangle, or none: each has its material's
 
   // Which joints move a position and how much: `joints_each` of both for every position, or none.
   size_t joints_each = 0;
@@ -26,7 +28,8 @@ struct GltfPrimitive {
 class GltfPrimitives {
  public:
   // `nodes` decide which compressed primitives are decoded: those of meshes that some node places.
-  GltfPrimitives(const GltfDocument& document, GltfAccessors& accessors, MeshBuilder& builder);
+  GltfPrimitives(const GltfDocument& document, GltfAccessors& accessors, GltfMaterials& materials,
+                 MeshBuilder& builder);
 
   // A mesh's primitives with triangles, read on first use. `weights` are those of a node; without any the
   // mesh's own hold. Throws Failure.
@@ -45,6 +48,7 @@ class GltfPrimitives {
 
   GltfPrimitive read(const tinygltf::Primitive& source, int mode, const std::vector<double>& weights);
   Values read_values(const tinygltf::Primitive& source, const std::string& name, int components);
+  void read_colors(const tinygltf::Primitive& source, const std::vector<double>& weights, GltfPrimitive& out);
   void read_joints(const tinygltf::Primitive& source, GltfPrimitive& out);
   void morph(const tinygltf::Primitive& source, const std::string& name, const std::vector<double>& weights,
              Values& values);
@@ -55,6 +59,7 @@ class GltfPrimitives {
 
   const GltfDocument& document_;
   GltfAccessors& accessors_;
+  GltfMaterials& materials_;
   MeshBuilder& builder_;
   std::map<std::pair<int, std::vector<double>>, std::vector<GltfPrimitive>> meshes_;
   // Decoded compressed primitives: their indices and attributes by name.

@@ -56,7 +56,8 @@ Mesh import_meshes(std::span<const std::filesystem::path> inputs, const ImportOp
                               std::to_string(rejected.degenerate - before.degenerate) + " degenerate, " +
                               std::to_string(rejected.non_finite - before.non_finite) + " not finite, " +
                               std::to_string(rejected.out_of_range - before.out_of_range) +
-                              " with indices out of range)";
+                              " with indices out of range, " +
+                              std::to_string(rejected.invisible - before.invisible) + " wholly transparent)";
       throw Failure(Exit::kInvalid, path.string(), why + ", repair or leave out the file");
     }
   }

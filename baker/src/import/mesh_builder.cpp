@@ -68,7 +68,7 @@ void MeshBuilder::check_count(const std::string& file, uint64_t more) const {
 uint64_t MeshBuilder::allocated_bytes() const {
   const auto bytes = [](const auto& vector) { return vector.capacity() * sizeof(vector[0]); };
   return bytes(exact_) + bytes(mesh_.triangles) + bytes(mesh_.primitives) + bytes(mesh_.normals) +
-         bytes(mesh_.material_ids) + 2 * bytes(mesh_.materials) + bytes(slots_) + bytes(welded_) +
+         bytes(mesh_.material_ids) + bytes(mesh_.colors) + 2 * bytes(mesh_.materials) + bytes(slots_) + bytes(welded_) +
          bytes(unsmooth_);
 }
 
@@ -86,7 +86,8 @@ void MeshBuilder::begin(const std::string& file, std::span<const glm::dvec3> pos
   // while it grows.
   constexpr uint64_t kTriangleBytes =
       sizeof(glm::uvec3) + sizeof(uint32_t) + 3 * sizeof(glm::vec3) + sizeof(uint32_t);
-  budget_.charge(file, triangle_count, kTriangleBytes * 3 / 2);
+  budget_.charge(file, triangle_count,
+                 (kTriangleBytes + (mesh_.colors.empty() ? 0 : sizeof(TriangleColor))) * 3 / 2);
   budget_.charge(file, positions.size(), sizeof(uint32_t) + sizeof(glm::dvec3) * 3 / 2);
   file_ = file;
   positions_ = positions;
@@ -104,9 +105,11 @@ void MeshBuilder::begin(const std::string& file, std::span<const glm::dvec3> pos
   reserve(mesh_.primitives);
   reserve(mesh_.normals);
   reserve(mesh_.material_ids);
+  if (!mesh_.colors.empty()) reserve(mesh_.colors);
 }
 
-void MeshBuilder::add(const glm::uvec3& corners, const glm::vec3* normals, uint32_t material) {
+void MeshBuilder::add(const glm::uvec3& corners, const glm::vec3* normals, uint32_t material,
+                      const TriangleColor* color) {
   const auto primitive = uint32_t(mesh_.primitive_count++);
   const size_t count = positions_.size();
   if (corners.x >= count || corners.y >= count || corners.z >= count) {
@@ -121,6 +124,12 @@ void MeshBuilder::add(const glm::uvec3& corners, const glm::vec3* normals, uint3
   // Not where rounding makes it a triangle: many a mesh has such slivers, and neighbours that meet in them.
   if (is_degenerate(a, b, c) && is_degenerate(rounded(a), rounded(b), rounded(c))) {
     ++mesh_.rejected.degenerate;
+    return;
+  }
+
+  const TriangleColor own = color ? *color : mesh_.materials[material].color();
+  if (!(own.coverage > 0)) {
+    ++mesh_.rejected.invisible;
     return;
   }
 
@@ -156,6 +165,19 @@ void MeshBuilder::add(const glm::uvec3& corners, const glm::vec3* normals, uint3
   mesh_.primitives.push_back(primitive);
   mesh_.normals.push_back(unit);
   mesh_.material_ids.push_back(material);
+  if (mesh_.colors.empty()) {
+    if (!color || own == mesh_.materials[material].color()) return;
+    start_colors();
+  }
+  mesh_.colors.push_back(own);
+}
+
+// From the first triangle on that is not as its material says, each has a colour.
+void MeshBuilder::start_colors() {
+  budget_.charge(file_, mesh_.triangles.capacity(), sizeof(TriangleColor));
+  mesh_.colors.reserve(mesh_.triangles.capacity());
+  for (size_t t = 0; t + 1 < mesh_.triangles.size(); ++t)
+    mesh_.colors.push_back(mesh_.materials[mesh_.material_ids[t]].color());
 }
 
 void MeshBuilder::end() {
@@ -304,6 +326,7 @@ Mesh MeshBuilder::take() {
       {rejected.degenerate, "have no area"},
       {rejected.non_finite, "have a corner that is not finite"},
       {rejected.out_of_range, "refer to vertices that are not there"},
+      {rejected.invisible, "are wholly transparent"},
       {rejected.collapsed, "are too small for single precision in a scene of this size"}};
   for (const auto& [count, why] : left_out) {
     if (count) note(std::to_string(count) + " triangles " + why + ", they are left out");

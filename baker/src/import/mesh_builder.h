@@ -37,8 +37,10 @@ class MeshBuilder {
              MissingNormals missing);
 
   // Counts one triangle, and keeps it unless it is to be rejected. `normals` are the file's at the corners:
-  // any length, NaN where the file has none; null where it has none for all three.
-  void add(const glm::uvec3& corners, const glm::vec3* normals, uint32_t material);
+  // any length, NaN where the file has none; null where it has none for all three. `color` is its own; null:
+  // the material's.
+  void add(const glm::uvec3& corners, const glm::vec3* normals, uint32_t material,
+           const TriangleColor* color = nullptr);
 
   // Ends the group; corners still without a normal get one.
   void end();
@@ -46,6 +48,7 @@ class MeshBuilder {
   uint32_t add_material(Material material);
   // The material of triangles to which no file gives one; made on first use.
   uint32_t default_material();
+  bool is_default(uint32_t material) const { return material == default_material_; }
   void note(const std::string& text);
   Budget& budget() { return budget_; }
   // What the mesh so far and its welding keep allocated.
@@ -62,6 +65,7 @@ class MeshBuilder {
  private:
   uint32_t weld(const glm::dvec3& position);
   void grow_slots();
+  void start_colors();
   void smooth_missing();
 
   Budget& budget_;

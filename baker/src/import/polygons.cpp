@@ -55,6 +55,7 @@ bool PolygonSoup::end_face(const std::string& file, Budget& budget) {
     ++too_small;
     corners.resize(begin);
     if (!corner_normals.empty()) corner_normals.resize(begin);
+    if (!corner_texcoords.empty()) corner_texcoords.resize(begin);
     return false;
   }
   if (corners.size() >= kNoIndex)
@@ -78,49 +79,38 @@ EarCut triangulate(std::span<const glm::dvec3> corners, std::vector<glm::uvec3>&
   return clipper.cut(flat, out, work);
 }
 
-void add_polygons(const std::string& file, const PolygonSoup& soup, MeshBuilder& builder) {
-  builder.begin(file, soup.positions, soup.triangle_count(), MissingNormals::kSmooth);
+namespace {
+
+// A triangle: three corners of a face.
+struct Piece {
+  uint32_t face;
+  glm::uvec3 corners;  // into the soup's
+};
+
+uint32_t material_of(const PolygonSoup& soup, uint32_t face) {
+  return face < soup.materials.size() ? soup.materials[face] : soup.material;
+}
+
+// Calls add(piece) for all triangles of all faces in order.
+template <typename Add>
+void cut_faces(const std::string& file, const PolygonSoup& soup, MeshBuilder& builder, const Add& add) {
   std::vector<glm::dvec3> polygon;
   std::vector<glm::uvec3> cut;
   uint64_t work = kEarWork, crossed = 0;
-  const auto add = [&](size_t begin, const glm::uvec3& local, uint32_t material) {
-    glm::uvec3 triangle;
-    glm::vec3 normals[3];
-    for (int i = 0; i < 3; ++i) {
-      triangle[i] = soup.corners[begin + local[i]];
-      const uint32_t normal = soup.corner_normals.empty() ? kNoIndex : soup.corner_normals[begin + local[i]];
-      normals[i] = normal < soup.normals.size() ? soup.normals[normal]
-                                                : glm::vec3(std::numeric_limits<float>::quiet_NaN());
+  uint32_t begin = 0;
+  for (uint32_t face = 0; face < soup.face_ends.size(); ++face) {
+    const uint32_t end = soup.face_ends[face];
+    polygon.clear();
+    for (uint32_t k = begin; k < end && end - begin > 3 && soup.corners[k] < soup.positions.size(); ++k)
+      polygon.push_back(soup.positions[soup.corners[k]]);
+    cut.clear();
+    if (polygon.size() == end - begin) {
+      crossed += triangulate(polygon, cut, work) == EarCut::kCrossed;
+    } else {  // a triangle, or one where the builder rejects what touches the missing corner, and keeps the rest
+      for (uint32_t i = 2; i < end - begin; ++i) cut.push_back({0, i - 1, i});
     }
-    builder.add(triangle, normals, material);
-  };
-  size_t begin = 0;
-  for (size_t face = 0; face < soup.face_ends.size(); ++face) {
-    const size_t end = soup.face_ends[face];
-    const uint32_t material = face < soup.materials.size() ? soup.materials[face] : soup.material;
-    if (end - begin == 3) {
-      add(begin, {0, 1, 2}, material);
-    } else {
-      polygon.clear();
-      bool usable = true;
-      for (size_t k = begin; k < end && usable; ++k) {
-        usable = soup.corners[k] < soup.positions.size();
-        if (usable) polygon.push_back(soup.positions[soup.corners[k]]);
-      }
-      cut.clear();
-      if (usable) {
-        crossed += triangulate(polygon, cut, work) == EarCut::kCrossed;
-      } else {  // the builder rejects the fan's triangles that touch the missing corner, and keeps the others
-        for (uint32_t i = 2; i < end - begin; ++i) cut.push_back({0, i - 1, i});
-      }
-      for (const glm::uvec3& local : cut) add(begin, local, material);
-    }
+    for (const glm::uvec3& local : cut) add(Piece{face, local + begin});
     begin = end;
-  }
-  builder.end();
-  if (soup.too_small) {
-    builder.note(file + ": " + std::to_string(soup.too_small) +
-                 " faces with fewer than three corners hold no triangle");
   }
   if (crossed) {
     builder.note(file + ": " + std::to_string(crossed) +
@@ -128,6 +118,70 @@ void add_polygons(const std::string& file, const PolygonSoup& soup, MeshBuilder&
   }
   if (work == 0) {
     builder.note(file + ": concave polygons are too many or too large to cut well, the last are cut as fans");
+  }
+}
+
+// A colour for each piece.
+std::vector<TriangleColor> piece_colors(const PolygonSoup& soup, std::span<const Piece> pieces,
+                                        MeshBuilder& builder) {
+  std::map<uint32_t, std::vector<uint32_t>> by_material;
+  for (uint32_t i = 0; i < pieces.size(); ++i) by_material[material_of(soup, pieces[i].face)].push_back(i);
+  const bool by_vertex = !soup.colors.empty() || !soup.face_colors.empty();
+  std::vector<TriangleColor> colors(pieces.size());
+  for (const auto& [material, list] : by_material) {
+    const Material& plain = builder.mesh().materials[material];
+    Surface surface{plain.base_color, plain.emission, {AlphaMode::kBlend, plain.opacity}, {}, {}};
+    // A grey that stands for no material must not darken what the vertices say.
+    if (by_vertex && builder.is_default(material)) surface.base_color = glm::vec3(1);
+    if (const auto found = soup.surfaces.find(material); found != soup.surfaces.end()) surface = found->second;
+    const std::vector<TriangleColor> own = mean_colors(surface, list.size(), [&](size_t t, SurfaceCorner(&out)[3]) {
+      const Piece& piece = pieces[list[t]];
+      for (int i = 0; i < 3; ++i) {
+        const uint32_t corner = piece.corners[i];
+        const uint32_t uv = corner < soup.corner_texcoords.size() ? soup.corner_texcoords[corner] : kNoIndex;
+        const glm::dvec2 at = uv < soup.texcoords.size() ? soup.texcoords[uv] : glm::dvec2(0);
+        out[i].base_uv = surface.base.place(at);
+        out[i].glow_uv = surface.glow.place(at);
+        out[i].color = glm::vec4(1);
+        if (soup.corners[corner] < soup.colors.size()) out[i].color = {soup.colors[soup.corners[corner]], 1};
+        if (piece.face < soup.face_colors.size()) out[i].color = {soup.face_colors[piece.face], 1};
+      }
+    });
+    for (size_t i = 0; i < list.size(); ++i) colors[list[i]] = own[i];
+  }
+  return colors;
+}
+
+}  // namespace
+
+void add_polygons(const std::string& file, const PolygonSoup& soup, MeshBuilder& builder) {
+  builder.begin(file, soup.positions, soup.triangle_count(), MissingNormals::kSmooth);
+  const auto add = [&](const Piece& piece, const TriangleColor* color) {
+    glm::uvec3 triangle;
+    glm::vec3 normals[3];
+    for (int i = 0; i < 3; ++i) {
+      const uint32_t corner = piece.corners[i];
+      triangle[i] = soup.corners[corner];
+      const uint32_t normal = soup.corner_normals.empty() ? kNoIndex : soup.corner_normals[corner];
+      normals[i] = normal < soup.normals.size() ? soup.normals[normal]
+                                                : glm::vec3(std::numeric_limits<float>::quiet_NaN());
+    }
+    builder.add(triangle, normals, material_of(soup, piece.face), color);
+  };
+  if (soup.has_colors()) {
+    builder.budget().charge(file, soup.triangle_count(), sizeof(Piece) + 2 * sizeof(TriangleColor) + sizeof(uint32_t));
+    std::vector<Piece> pieces;
+    pieces.reserve(soup.triangle_count());
+    cut_faces(file, soup, builder, [&](const Piece& piece) { pieces.push_back(piece); });
+    const std::vector<TriangleColor> colors = piece_colors(soup, pieces, builder);
+    for (size_t i = 0; i < pieces.size(); ++i) add(pieces[i], &colors[i]);
+  } else {
+    cut_faces(file, soup, builder, [&](const Piece& piece) { add(piece, nullptr); });
+  }
+  builder.end();
+  if (soup.too_small) {
+    builder.note(file + ": " + std::to_string(soup.too_small) +
+                 " faces with fewer than three corners hold no triangle");
   }
 }
 

@@ -63,6 +63,7 @@ void remove_triangles(Mesh& mesh, const std::vector<bool>& gone) {
   compact(mesh.primitives);
   compact(mesh.normals);
   compact(mesh.material_ids);
+  compact(mesh.colors);
   std::vector<uint32_t> place(mesh.positions.size(), 0);
   for (const glm::uvec3& triangle : mesh.triangles)
     place[triangle.x] = place[triangle.y] = place[triangle.z] = 1;
