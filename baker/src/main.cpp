@@ -12,6 +12,7 @@
 #include <sstream>
 
 #include "bake.h"
+#include "color_materials.h"
 #include "error.h"
 #include "import/import.h"
 #include "import/source_file.h"
@@ -105,6 +106,12 @@ std::string name_beside(const std::filesystem::path& file, const std::filesystem
   return printable((relative.empty() ? file : relative).generic_string());
 }
 
+std::vector<std::string> names_of(const std::vector<Material>& materials) {
+  std::vector<std::string> names;
+  for (const Material& material : materials) names.push_back(material.name);
+  return names;
+}
+
 // --strict: what is not read, or not as it stands, is an error.
 [[noreturn]] void refuse_notes(const Mesh& mesh) {
   for (const std::string& note : mesh.notes) std::fprintf(stderr, "lsp-bake: note: %s\n", note.c_str());
@@ -132,8 +139,8 @@ void write_depfile(const Arguments& a, const Mesh& mesh) {
 }
 
 // Provenance: nothing in it depends on the machine, the time, the threads or the folder.
-Json provenance(const Arguments& a, const Mesh& mesh, const std::array<uint64_t, 2>& source,
-                const MeasuredError& error) {
+Json provenance(const Arguments& a, const Mesh& mesh, const std::vector<std::string>& material_names,
+                const std::array<uint64_t, 2>& source, const MeasuredError& error) {
   Json inputs = Json::array();
   for (const auto& p : a.inputs) inputs.push_back(printable(p.filename().string()));
   Json sources = Json::array();
@@ -141,8 +148,6 @@ Json provenance(const Arguments& a, const Mesh& mesh, const std::array<uint64_t,
     Json& list = sources.emplace_back(Json::array());
     for (const auto& file : files) list.push_back(name_beside(file, files[0]));
   }
-  Json materials = Json::array();
-  for (const Material& m : mesh.materials) materials.push_back(m.name);
   static const std::map<Purpose, const char*> kPurposes = {{Purpose::kVisibility, "visibility"},
                                                            {Purpose::kAo, "ao"},
                                                            {Purpose::kDiffuse, "diffuse"},
@@ -178,7 +183,7 @@ Json provenance(const Arguments& a, const Mesh& mesh, const std::array<uint64_t,
             {"collapsed", mesh.rejected.collapsed},
             {"invisible", mesh.rejected.invisible}}},
           {"error", to_json(error)},
-          {"materials", materials}};
+          {"materials", material_names}};
 }
 
 Exit run(Arguments a) {
@@ -220,9 +225,11 @@ Exit run(Arguments a) {
   ImportOptions import_options;
   import_options.memory_limit = a.memory_limit;
   import_options.crease_angle_degrees = a.crease_angle;
-  const Mesh mesh = import_meshes(a.inputs, import_options);
+  Mesh mesh = import_meshes(a.inputs, import_options);
   if (a.strict && !mesh.notes.empty()) refuse_notes(mesh);
   const auto source = hash_sources(mesh);
+  const std::vector<std::string> material_names = names_of(mesh.materials);
+  make_color_materials(mesh);
   const double import_seconds = timer();
 
   BakeOptions options;
@@ -282,7 +289,7 @@ Exit run(Arguments a) {
   timer();
 
   bar.show("write", 0);
-  const Json meta = provenance(a, mesh, source, error);
+  const Json meta = provenance(a, mesh, material_names, source, error);
   const Written written =
       write_lsp(a.output, baked, meta.dump(), {a.align, a.compress == "zstd", 12, a.memory_limit});
   if (!a.depfile.empty()) write_depfile(a, mesh);
@@ -419,7 +426,8 @@ int main(int argc, char** argv) {
   app.add_option("--crease-angle", a.crease_angle, "Smooth normals are made up to this angle, in degrees")
       ->check(CLI::Range(0.0f, 180.0f));
   app.add_flag("--strict", a.strict, "Refuse, with exit 3, an input that leads to any note");
-  app.add_option("--depfile", a.depfile, "Write a rule for Make and Ninja: OUT.lsp: every file that was read");
+  app.add_option("--depfile", a.depfile,
+                 "Write a rule for Make and Ninja: OUT.lsp: every file that was read");
   app.add_flag("--no-splits", a.no_splits, "Build the tree without spatial splits");
   add_common_options(app, "lsp-bake", a.common);
   return run_program("lsp-bake", app, argc, argv, [&] {

@@ -53,7 +53,9 @@ struct Mesh {
   // Per input: itself, and after it every file beside it whose content is in the mesh.
   std::vector<std::vector<std::filesystem::path>> sources;
 
-  TriangleColor color(size_t t) const { return colors.empty() ? materials[material_ids[t]].color() : colors[t]; }
+  TriangleColor color(size_t t) const {
+    return colors.empty() ? materials[material_ids[t]].color() : colors[t];
+  }
 };
 
 }  // namespace lsp

@@ -111,8 +111,8 @@ TEST_F(LspBake, EveryFileReadIsInTheHashAndTheDepfile) {
   EXPECT_EQ(read("a.d"), "a.lsp: \\\n  my\\ scene/a.obj \\\n  my\\ scene/a.mtl \\\n  grid.obj\n");
   ASSERT_EQ(run("'my scene/a.obj' -o b.lsp --depth 3 --compress zstd"), 0);
   const auto validate = [&](const std::string& file, const std::string& meshes) {
-    const std::string command = "cd '" + folder_.string() + "' && '" + LSP_BIN_DIR + "/lsp-validate' --quiet " +
-                                file + " --mesh " + meshes + " 2>/dev/null";
+    const std::string command = "cd '" + folder_.string() + "' && '" + LSP_BIN_DIR +
+                                "/lsp-validate' --quiet " + file + " --mesh " + meshes + " 2>/dev/null";
     return WEXITSTATUS(std::system(command.c_str()));
   };
   EXPECT_EQ(validate("a.lsp", "'my scene/a.obj' grid.obj"), 0);

@@ -34,9 +34,10 @@ struct Square {
     return {{"index", last}};
   }
   const Document& finish() {
-    document.node({{"mesh", document.mesh({{"attributes", attributes},
-                                           {"indices", document.indices<uint16_t>({0, 1, 2, 0, 2, 3}, kUshort)},
-                                           {"material", 0}})}});
+    document.node(
+        {{"mesh", document.mesh({{"attributes", attributes},
+                                 {"indices", document.indices<uint16_t>({0, 1, 2, 0, 2, 3}, kUshort)},
+                                 {"material", 0}})}});
     return document;
   }
 };
@@ -112,7 +113,8 @@ TEST_F(GltfColor, PicturesBesideTheFileAndInIt) {
   write("a b.png", png);
   std::filesystem::create_directory(folder_ / "tex");
   write("tex/c.png", png);
-  for (const std::string& uri : {std::string("a%20b.png"), std::string("tex\\c.png"), "data:image/png;base64," + base64(png)}) {
+  for (const std::string& uri :
+       {std::string("a%20b.png"), std::string("tex\\c.png"), "data:image/png;base64," + base64(png)}) {
     Square square;
     square.base()["baseColorTexture"] = square.texture(png);
     square.document.root["images"][0] = {{"uri", uri}};
@@ -124,9 +126,11 @@ TEST_F(GltfColor, PicturesBesideTheFileAndInIt) {
 }
 
 TEST_F(GltfColor, WhatCannotBeReadIsNotedAndTheFactorHolds) {
-  for (const std::string& bytes : {std::string("\xABKTX 20\xBB\r\n\x1A\n"), std::string("nonsense"), std::string()}) {
+  for (const std::string& bytes :
+       {std::string("\xABKTX 20\xBB\r\n\x1A\n"), std::string("nonsense"), std::string()}) {
     Square square;
-    square.base() = {{"baseColorFactor", {0.25, 0.5, 1, 1}}, {"baseColorTexture", square.texture(bytes + "    ")}};
+    square.base() = {{"baseColorFactor", {0.25, 0.5, 1, 1}},
+                     {"baseColorTexture", square.texture(bytes + "    ")}};
     if (bytes.empty()) square.document.root["images"][0] = {{"uri", "gone.png"}};
     const Mesh mesh = import(square);
     EXPECT_TRUE(mesh.colors.empty());
@@ -137,12 +141,12 @@ TEST_F(GltfColor, WhatCannotBeReadIsNotedAndTheFactorHolds) {
 }
 
 TEST_F(GltfColor, WrapModes) {
-  // Left texel white, right black; coordinates from 1 to 2 see the same, the last column, or both turned round.
+  // Left texel white, right black; coordinates from 1 to 2 see the same, the last column, or both turned
+  // round.
   const std::string png = rgba_png(2, 1, {255, 255, 255, 255, 0, 0, 0, 255});
   const auto white_at = [&](int wrap, float u) {
     Square square({u, 0, u + 0.5f, 0, u + 0.5f, 1, u, 1});
-    square.base()["baseColorTexture"] =
-        square.texture(png, {{"wrapS", wrap}, {"magFilter", 9728}});
+    square.base()["baseColorTexture"] = square.texture(png, {{"wrapS", wrap}, {"magFilter", 9728}});
     return mean(import(square)).base_color.x;
   };
   constexpr int kRepeat = 10497, kClamp = 33071, kMirror = 33648;
@@ -156,7 +160,8 @@ TEST_F(GltfColor, WrapModes) {
 
 TEST_F(GltfColor, TextureTransformsAndSecondCoordinates) {
   // Four texels: red, green; blue, white.
-  const std::string png = rgba_png(2, 2, {255, 0, 0, 255, 0, 255, 0, 255, 0, 0, 255, 255, 255, 255, 255, 255});
+  const std::string png =
+      rgba_png(2, 2, {255, 0, 0, 255, 0, 255, 0, 255, 0, 0, 255, 255, 255, 255, 255, 255});
   const auto color_with = [&](const json& transform, int set) {
     Square square;
     square.attributes["TEXCOORD_1"] = square.document.values<uint8_t>(
@@ -172,7 +177,8 @@ TEST_F(GltfColor, TextureTransformsAndSecondCoordinates) {
   expect_color(color_with({{"texCoord", 1}}, 0), {0, 1, 0}, 0.01f);
   expect_color(color_with({{"offset", {0.5, 0.5}}, {"scale", {0.5, 0.5}}}, 0), {1, 1, 1}, 1e-4f);
   // The extension's own example: the lower left quarter, turned.
-  expect_color(color_with({{"offset", {0, 1}}, {"rotation", 1.57079632679}, {"scale", {0.5, 0.5}}}, 0), {0, 0, 1}, 1e-4f);
+  expect_color(color_with({{"offset", {0, 1}}, {"rotation", 1.57079632679}, {"scale", {0.5, 0.5}}}, 0),
+               {0, 0, 1}, 1e-4f);
 }
 
 TEST_F(GltfColor, VertexColoursOfEveryTypeMultiply) {
@@ -183,11 +189,13 @@ TEST_F(GltfColor, VertexColoursOfEveryTypeMultiply) {
       square.base()["baseColorFactor"] = {1, 0.5, 1, 1};
       Document& d = square.document;
       square.attributes["COLOR_0"] =
-          type == kFloat   ? d.values<float>({0.2f, 0.2f, 0, 0.2f, 0.2f, 0, 0.2f, 0.2f, 0, 0.2f, 0.2f, 0}, type, "VEC3", 3)
-          : type == kUbyte ? d.values<uint8_t>({51, 51, 0, 255, 51, 51, 0, 255, 51, 51, 0, 255, 51, 51, 0, 255}, type,
-                                               "VEC4", 4, true)
-                           : d.values<uint16_t>({13107, 13107, 0, 13107, 13107, 0, 13107, 13107, 0, 13107, 13107, 0},
-                                                type, "VEC3", 3, true);
+          type == kFloat
+              ? d.values<float>({0.2f, 0.2f, 0, 0.2f, 0.2f, 0, 0.2f, 0.2f, 0, 0.2f, 0.2f, 0}, type, "VEC3", 3)
+          : type == kUbyte
+              ? d.values<uint8_t>({51, 51, 0, 255, 51, 51, 0, 255, 51, 51, 0, 255, 51, 51, 0, 255}, type,
+                                  "VEC4", 4, true)
+              : d.values<uint16_t>({13107, 13107, 0, 13107, 13107, 0, 13107, 13107, 0, 13107, 13107, 0}, type,
+                                   "VEC3", 3, true);
       const float texel = textured ? linear(188) : 1;
       expect_color(import(square).colors[0].base_color, {0.2f * texel, 0.1f * texel, 0});
     }
@@ -197,7 +205,8 @@ TEST_F(GltfColor, VertexColoursOfEveryTypeMultiply) {
 TEST_F(GltfColor, VertexColoursVaryOverTheTexels) {
   // The texture is white on the left half; red grows from left to right.
   Square square;
-  square.base()["baseColorTexture"] = square.texture(rgba_png(2, 1, {255, 255, 255, 255, 0, 0, 0, 255}), {{"magFilter", 9728}});
+  square.base()["baseColorTexture"] =
+      square.texture(rgba_png(2, 1, {255, 255, 255, 255, 0, 0, 0, 255}), {{"magFilter", 9728}});
   square.attributes["COLOR_0"] =
       square.document.values<float>({0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 1, 1}, kFloat, "VEC3", 3);
   expect_color(mean(import(square)).base_color, {0.125, 0.5, 0.5}, 1e-5f);
@@ -206,7 +215,8 @@ TEST_F(GltfColor, VertexColoursVaryOverTheTexels) {
 TEST_F(GltfColor, EmissionIsTheMeanOfItsTexels) {
   std::vector<uint8_t> texels(64 * 4, 0);
   for (size_t i = 3; i < texels.size(); i += 4) texels[i] = 255;
-  texels[4 * 6] = texels[4 * 6 + 1] = texels[4 * 6 + 2] = 255;  // column 6 of the first row: the first triangle's
+  texels[4 * 6] = texels[4 * 6 + 1] = texels[4 * 6 + 2] =
+      255;  // column 6 of the first row: the first triangle's
   Square square;
   square.material() = {{"emissiveFactor", {1, 0.5, 0}},
                        {"emissiveTexture", square.texture(rgba_png(8, 8, texels))},
@@ -220,13 +230,15 @@ TEST_F(GltfColor, MasksAreTheShareThatIsThere) {
   // One texel of four passes the cutoff; only its colour counts.
   const std::string png = rgba_png(2, 2, {255, 0, 0, 200, 0, 255, 0, 10, 0, 255, 0, 10, 0, 255, 0, 10});
   Square square;
-  square.material() = {{"alphaMode", "MASK"}, {"pbrMetallicRoughness", {{"baseColorTexture", square.texture(png)}}}};
+  square.material() = {{"alphaMode", "MASK"},
+                       {"pbrMetallicRoughness", {{"baseColorTexture", square.texture(png)}}}};
   square.material()["alphaCutoff"] = 0.5;
   const TriangleColor color = mean(import(square.finish()));
   EXPECT_NEAR(color.coverage, 0.25f, 1e-5f);
   expect_color(color.base_color, {1, 0, 0});
   square.base()["baseColorFactor"] = {1, 1, 1, 0.5};  // 200/255/2 is below the cutoff
-  EXPECT_EQ(MeshFiles::refusal("a.gltf", square.document.gltf()).exit, lsp::Exit::kInvalid) << "nothing is left";
+  EXPECT_EQ(MeshFiles::refusal("a.gltf", square.document.gltf()).exit, lsp::Exit::kInvalid)
+      << "nothing is left";
   square.material()["alphaCutoff"] = 0.01;
   EXPECT_NEAR(mean(import(square.document)).coverage, 1.0f, 1e-5f);
 }
@@ -235,7 +247,8 @@ TEST_F(GltfColor, BlendingIsTheMeanOfAlpha) {
   const std::string png = rgba_png(2, 1, {255, 0, 0, 255, 0, 0, 255, 51});
   Square square;
   square.material() = {{"alphaMode", "BLEND"},
-                       {"pbrMetallicRoughness", {{"baseColorFactor", {1, 1, 1, 0.5}}, {"baseColorTexture", square.texture(png)}}}};
+                       {"pbrMetallicRoughness",
+                        {{"baseColorFactor", {1, 1, 1, 0.5}}, {"baseColorTexture", square.texture(png)}}}};
   const TriangleColor color = mean(import(square));
   EXPECT_NEAR(color.coverage, 0.5f * 0.6f, 1e-5f);
   expect_color(color.base_color, {1 / 1.2, 0, 0.2 / 1.2}, 1e-4f);
@@ -256,8 +269,8 @@ TEST_F(GltfColor, TransparentTrianglesAreLeftOut) {
 
 TEST_F(GltfColor, VertexAlphaIsCoverageWhereTheMaterialBlends) {
   Square square;
-  square.attributes["COLOR_0"] = square.document.values<float>(
-      {1, 1, 1, 1, 1, 1, 1, 0, 1, 1, 1, 0, 1, 1, 1, 1}, kFloat, "VEC4", 4);
+  square.attributes["COLOR_0"] =
+      square.document.values<float>({1, 1, 1, 1, 1, 1, 1, 0, 1, 1, 1, 0, 1, 1, 1, 1}, kFloat, "VEC4", 4);
   square.finish();
   EXPECT_TRUE(import(square.document).colors.empty() || mean(import(square.document)).coverage == 1.0f);
   square.material()["alphaMode"] = "BLEND";
@@ -310,14 +323,15 @@ TEST_F(GltfColor, GlossAndMetalAreMeansAndOtherTexturesAreNoted) {
   const Mesh mesh = import(square);
   EXPECT_NEAR(mesh.materials[mesh.material_ids[0]].roughness, 0.3f, 1e-5f);
   EXPECT_NEAR(mesh.materials[mesh.material_ids[0]].metallic, 0.1f, 1e-5f);
-  for (const char* part : {"metallic-roughness", "normal", "occlusion"}) EXPECT_TRUE(has_note(mesh, part)) << part;
+  for (const char* part : {"metallic-roughness", "normal", "occlusion"})
+    EXPECT_TRUE(has_note(mesh, part)) << part;
 }
 
 TEST_F(GltfColor, SpecularGlossinessHasItsOwnTexture) {
   Square square;
   const json texture = square.texture(rgba_png(1, 1, {255, 0, 0, 127}));
   square.material()["extensions"]["KHR_materials_pbrSpecularGlossiness"] = {{"diffuseFactor", {0.5, 1, 1, 1}},
-                                                                           {"diffuseTexture", texture}};
+                                                                            {"diffuseTexture", texture}};
   square.material()["alphaMode"] = "BLEND";
   const Mesh mesh = import(square);
   expect_color(mesh.colors[0].base_color, {0.5, 0, 0});

@@ -76,7 +76,8 @@ TEST_F(Gltf, UrisAsExportersWriteThem) {
     return import(external);
   };
   EXPECT_TRUE(has_note(import_with("sub/a.bin", "sub\\a.bin"), "read as a path"));
-  EXPECT_TRUE(has_note(import_with("50%25.bin", "50%25.bin"), "read as a path")) << "percent signs not encoded";
+  EXPECT_TRUE(has_note(import_with("50%25.bin", "50%25.bin"), "read as a path"))
+      << "percent signs not encoded";
   EXPECT_TRUE(import_with("b c.bin", "b%20c.bin").notes.empty());
   EXPECT_TRUE(import_with("back\\slash.bin", "back\\slash.bin").notes.empty()) << "such a file may exist";
 }

@@ -5,6 +5,8 @@
 #include <chrono>
 
 #include "import/polygons.h"
+#include "import/texture.h"
+#include "png_bytes.h"
 
 namespace {
 
@@ -117,6 +119,60 @@ TEST_F(Obj, MaterialsWithSpacesEmissionAndWindowsPaths) {
   EXPECT_FLOAT_EQ(material(2).roughness, 0.25f);
   EXPECT_EQ(material(3).name, "nowhere");
   EXPECT_TRUE(has_note(mesh, "named but not defined"));
+}
+
+TEST_F(Obj, TexturesWithTheirOptions) {
+  // Upper row red, green; lower row blue, white; half of the mask's alpha is there.
+  write("a picture.png",
+        rgba_png(2, 2, {255, 0, 0, 255, 0, 255, 0, 255, 0, 0, 255, 255, 255, 255, 255, 255}));
+  write("mask.png", rgba_png(2, 1, {0, 0, 0, 255, 0, 0, 0, 0}));
+  write("grey.png", png_bytes<uint8_t>(1, 1, PNG_FORMAT_GRAY, {51}));
+  const auto color_with = [&](const std::string& material, const std::string& uv) {
+    write("a.mtl", "newmtl m\n" + material);
+    return import("a.obj", "mtllib a.mtl\nusemtl m\n" + kSquare + uv + "f 1/1 2/2 3/3\nf 1/1 3/3 4/4\n");
+  };
+  // In the middle of the lower left texel of four.
+  const std::string lower_left = "vt 0.2 0.2\nvt 0.3 0.2\nvt 0.3 0.3\nvt 0.2 0.3\n",
+                    all = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
+  const std::string in_other = "map_Kd -o 0.5 0.5 0 -s 1 1 1 a picture.png\n";
+  EXPECT_NEAR(color_with("map_Kd a picture.png\n", lower_left).color(0).base_color.b, 1.0f, 0.1f);
+  EXPECT_LT(color_with("map_Kd a picture.png\n", lower_left).color(0).base_color.r, 0.1f);
+  EXPECT_NEAR(color_with(in_other, lower_left).color(0).base_color.g, 1.0f, 0.1f);
+  const Mesh scaled = color_with("Kd 0.5 1 1\nmap_Kd -s 0.5 0.5 C:\\art\\a picture.png\n", all);
+  EXPECT_GT(scaled.color(0).base_color.b, 0.7f) << "the lower left quarter, and what blends into it";
+  EXPECT_EQ(scaled.sources[0].size(), 3u);
+  const Mesh masked = color_with("d 0.5\nmap_Kd a picture.png\nmap_d mask.png\n", all);
+  EXPECT_NEAR(masked.color(0).coverage + masked.color(1).coverage, 0.5f, 1e-4f);
+  EXPECT_NEAR(masked.color(0).base_color.g, 0.0f, 1e-4f) << "what is masked has no colour";
+  EXPECT_NEAR(color_with("map_d grey.png\n", all).color(0).coverage, 0.2f, 1e-4f) << "grey is what is solid";
+  EXPECT_NEAR(color_with("map_d -imfchan r a picture.png\n", all).color(0).coverage, 0.5f, 0.3f);
+  EXPECT_NEAR(color_with("map_Ke a picture.png\nKe 4 4 4\n", lower_left).color(0).emission.b, 4.0f, 0.4f);
+  const Mesh noted = color_with("map_Bump -bm 2 x.png\nmap_Kd -mm 0 2 gone.png\n", all);
+  for (const char* part : {"map_Bump", "-mm", "gone.png"}) EXPECT_TRUE(has_note(noted, part)) << part;
+}
+
+TEST_F(Obj, OpacityInEitherForm) {
+  const auto opacity = [&](const std::string& lines) {
+    write("a.mtl", "newmtl m\n" + lines);
+    const Mesh mesh = import("a.obj", "mtllib a.mtl\n" + kSquare + "f 1 2 3\nusemtl m\nf 1 2 3\n");
+    return mesh.triangles.size() == 2 ? mesh.color(1).coverage : 0;
+  };
+  EXPECT_FLOAT_EQ(opacity("d 0.25\n"), 0.25f);
+  EXPECT_FLOAT_EQ(opacity("Tr 0.25\n"), 0.75f);
+  EXPECT_FLOAT_EQ(opacity("Tr 1\nd 1\n"), 1.0f) << "d wins";
+  EXPECT_FLOAT_EQ(opacity("d 1\nTr 1\n"), 1.0f) << "in either order";
+  EXPECT_EQ(opacity("d 0\n"), 0.0f) << "left out";
+}
+
+TEST_F(Obj, VertexColours) {
+  const std::string faces = "f 1 2 3\n";
+  const Mesh mesh = import("a.obj", "v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 0 0.7372549 0\n" + faces);
+  EXPECT_NEAR(mesh.color(0).base_color.r, 2 / 3.0f, 1e-5f);
+  EXPECT_NEAR(mesh.color(0).base_color.g, lsp::linear_of_srgb(0.7372549) / 3, 1e-5);
+  EXPECT_NEAR(
+      import("a.obj", "v 0 0 0 255 0 0\nv 1 0 0 255 0 0\nv 0 1 0 255 0 0\n" + faces).color(0).base_color.r, 1,
+      1e-5f);
+  EXPECT_TRUE(import("a.obj", "v 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\n" + faces).colors.empty()) << "a weight";
 }
 
 TEST_F(Obj, AMissingLibraryIsANote) {
@@ -465,7 +521,7 @@ TEST_F(Ply, AllEncodingsGiveTheSameMesh) {
     EXPECT_EQ(mesh.positions.size(), 4u);
     EXPECT_NEAR(area(mesh), 1.5, 1e-6);
     EXPECT_EQ(corner(mesh, 0, 2), glm::vec3(1, 1, 3));
-    EXPECT_TRUE(has_note(mesh, "colours"));
+    EXPECT_TRUE(mesh.colors.empty()) << "red alone is no colour";
   }
 }
 
@@ -480,6 +536,38 @@ TEST_F(Ply, NormalsAndStrips) {
   for (size_t t = 0; t < 3; ++t) EXPECT_GT(face_normal(mesh, t).z, 0.99f);
   EXPECT_EQ(mesh.normals[0][0], glm::vec3(0, 0, 1));
   EXPECT_EQ(mesh.normals[2][1], glm::vec3(0, 1, 0));
+}
+
+TEST_F(Ply, ColoursOfVerticesAndFaces) {
+  const auto colored = [&](const std::string& type, const std::string& a, const std::string& b) {
+    const std::string rgb =
+        "property " + type + " red\nproperty " + type + " green\nproperty " + type + " blue\n";
+    return import(
+        "a.ply",
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n" +
+            rgb + "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 " + a +
+            "\n1 0 0 " + b + "\n0 1 0 " + b + "\n3 0 1 2\n");
+  };
+  for (const Mesh& mesh :
+       {colored("uchar", "255 0 188", "0 0 188"), colored("float", "1 0 0.7372549", "0 0 0.7372549"),
+        colored("ushort", "65535 0 48316", "0 0 48316")}) {
+    EXPECT_NEAR(mesh.color(0).base_color.r, 1 / 3.0f, 1e-5f);
+    EXPECT_EQ(mesh.color(0).base_color.g, 0.0f);
+    EXPECT_NEAR(mesh.color(0).base_color.b, lsp::linear_of_srgb(188 / 255.0), 1e-5);
+    EXPECT_TRUE(mesh.notes.empty());
+  }
+  const Mesh faces = import("a.ply",
+                            "ply\nformat ascii 1.0\ncomment TextureFile a.png\nelement vertex 3\nproperty "
+                            "float x\nproperty float y\nproperty float z\n"
+                            "element face 3\nproperty list uchar int vertex_indices\nproperty uchar "
+                            "red\nproperty uchar green\nproperty uchar blue\n"
+                            "property uchar alpha\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 255 0 0 255\n2 0 "
+                            "1 1 2 3 255\n3 0 1 2 0 0 255 9\n");
+  ASSERT_EQ(faces.triangles.size(), 2u);
+  EXPECT_EQ(faces.color(0).base_color, glm::vec3(1, 0, 0));
+  EXPECT_EQ(faces.color(1).base_color, glm::vec3(0, 0, 1));
+  EXPECT_TRUE(has_note(faces, "a.png"));
+  EXPECT_TRUE(has_note(faces, "alpha"));
 }
 
 TEST_F(Ply, HeadersThatPromiseTooMuchAreRefusedAtOnce) {
@@ -563,10 +651,24 @@ TEST_F(Off, CommentsColoursBrokenLinesAndKeywords) {
     const Mesh mesh = import("a.off", start + body);
     EXPECT_EQ(mesh.triangles.size(), 4u) << start;
     EXPECT_NEAR(area(mesh), 2.0, 1e-6);
-    EXPECT_TRUE(has_note(mesh, "colours"));
+    EXPECT_EQ(mesh.color(2).base_color, glm::vec3(lsp::linear_of_srgb(0.5), 0, 0)) << start;
   }
   const Mesh with_normals = import("a.off", "NOFF\n3 1 0\n0 0 0 0 0 1\n1 0 0 0 1 0\n0 1 0 0 0 1\n3 0 1 2\n");
   EXPECT_EQ(with_normals.normals[0][1], glm::vec3(0, 1, 0));
+}
+
+TEST_F(Off, ColoursOfVerticesAndFaces) {
+  const Mesh mesh =
+      import("a.off",
+             "COFF\n4 2 0\n0 0 0 255 0 0 255\n1 0 0 255 0 0 255\n1 1 0 255 0 0 255\n0 1 0 0 255 0 128\n"
+             "3 0 1 2\n3 0 2 3\n");
+  EXPECT_EQ(mesh.color(0).base_color, glm::vec3(1, 0, 0));
+  EXPECT_NEAR(mesh.color(1).base_color.g, 1 / 3.0f, 1e-5f);
+  EXPECT_TRUE(has_note(mesh, "alpha"));
+  const Mesh faces =
+      import("a.off", "OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2 0 128 255\n3 0 2 3 7\n");
+  EXPECT_NEAR(faces.color(0).base_color.g, lsp::linear_of_srgb(128 / 255.0), 1e-6);
+  EXPECT_TRUE(has_note(faces, "by number"));
 }
 
 TEST_F(Off, Refusals) {

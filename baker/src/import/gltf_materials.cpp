@@ -98,7 +98,8 @@ void GltfMaterials::note_unread_textures(const json& source) {
   if (!member(source, "occlusionTexture").is_null()) note("occlusion textures are not read");
 }
 
-// A material has one roughness and one metalness: the factors times the means of the texture's green and blue.
+// A material has one roughness and one metalness: the factors times the means of the texture's green and
+// blue.
 void GltfMaterials::mean_roughness(const json& info, Material& material) {
   if (info.is_null()) return;
   const json& texture = element(member(document_.looks, "textures"), index_member(info, "index"));

@@ -22,8 +22,8 @@ class GltfMaterials {
                 MeshBuilder& builder)
       : path_(path), document_(document), accessors_(accessors), builder_(builder) {}
 
-  // Made on first use; where the document has none by that number, glTF's default: the builder's id is then that of
-  // triangles without a material.
+  // Made on first use; where the document has none by that number, glTF's default: the builder's id is then
+  // that of triangles without a material.
   const Entry& at(uint32_t index);
 
   // Forgets the pictures where they have come to take much memory.
@@ -44,7 +44,7 @@ class GltfMaterials {
   GltfAccessors& accessors_;
   MeshBuilder& builder_;
   std::map<uint32_t, Entry> materials_;
-  std::map<uint32_t, uint32_t> ids_;  // what materials_ held before it was forgotten, too
+  std::map<uint32_t, uint32_t> ids_;         // what materials_ held before it was forgotten, too
   std::map<int64_t, glm::dvec2> roughness_;  // means of pictures: roughness and metalness
   std::map<std::tuple<int64_t, AlphaMode, float, float>, std::shared_ptr<Texture>> pictures_;
   uint64_t charged_ = 0;

@@ -201,7 +201,8 @@ void GltfPrimitives::read_colors(const tinygltf::Primitive& source, const std::v
     return values;
   };
   const Values colors = values_of("COLOR_0");
-  const bool colored = std::any_of(colors.floats.begin(), colors.floats.end(), [](float x) { return x != 1; });
+  const bool colored =
+      std::any_of(colors.floats.begin(), colors.floats.end(), [](float x) { return x != 1; });
   const Surface& surface = entry.surface;
   if (!surface.has_textures() && !colored) return;
   const auto coordinates = [&](const TextureUse& use) {
@@ -209,7 +210,8 @@ void GltfPrimitives::read_colors(const tinygltf::Primitive& source, const std::v
     const std::string name = "TEXCOORD_" + std::to_string(use.set);
     Values values = values_of(name);
     if (values.floats.empty())
-      builder_.note(document_.file + ": a primitive has a texture and no " + name + ", its corner texel holds");
+      builder_.note(document_.file + ": a primitive has a texture and no " + name +
+                    ", its corner texel holds");
     return std::move(values.floats);
   };
   const std::vector<float> base = coordinates(surface.base), glow = coordinates(surface.glow);

@@ -14,9 +14,9 @@ namespace lsp {
 
 struct GltfPrimitive {
   std::vector<glm::vec3> positions;
-  std::vector<glm::vec3> normals;  // empty or one a position
-  std::vector<uint32_t> indices;   // three a triangle; those that refer to nothing may be any number
-  uint32_t material = 0;           // the builder's
+  std::vector<glm::vec3> normals;     // empty or one a position
+  std::vector<uint32_t> indices;      // three a triangle; those that refer to nothing may be any number
+  uint32_t material = 0;              // the builder's
   std::vector<TriangleColor> colors;  // one a triangle, or none: each has its material's
 
   // Which joints move a position and how much: `joints_each` of both for every position, or none.

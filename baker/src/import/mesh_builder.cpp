@@ -68,8 +68,8 @@ void MeshBuilder::check_count(const std::string& file, uint64_t more) const {
 uint64_t MeshBuilder::allocated_bytes() const {
   const auto bytes = [](const auto& vector) { return vector.capacity() * sizeof(vector[0]); };
   return bytes(exact_) + bytes(mesh_.triangles) + bytes(mesh_.primitives) + bytes(mesh_.normals) +
-         bytes(mesh_.material_ids) + bytes(mesh_.colors) + 2 * bytes(mesh_.materials) + bytes(slots_) + bytes(welded_) +
-         bytes(unsmooth_);
+         bytes(mesh_.material_ids) + bytes(mesh_.colors) + 2 * bytes(mesh_.materials) + bytes(slots_) +
+         bytes(welded_) + bytes(unsmooth_);
 }
 
 void MeshBuilder::add_source(const std::filesystem::path& path) {

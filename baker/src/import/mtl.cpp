@@ -28,8 +28,8 @@ bool read_factor(std::string_view line, float& factor) {
   return std::isfinite(value);
 }
 
-// "-option values... file name", which may hold spaces. Numbers end an option's values: -o, -s and -t take one to
-// three of them.
+// "-option values... file name", which may hold spaces. Numbers end an option's values: -o, -s and -t take
+// one to three of them.
 MtlMap read_map(std::string_view line, std::set<std::string>& notes) {
   MtlMap map;
   const auto take_numbers = [&](int most, glm::dvec2* to) {
@@ -44,14 +44,16 @@ MtlMap read_map(std::string_view line, std::set<std::string>& notes) {
   };
   while (true) {
     std::string_view ahead = line, option, value;
-    if (!take_word(ahead, option) || option.size() < 2 || option[0] != '-' || (option[1] >= '0' && option[1] <= '9'))
+    if (!take_word(ahead, option) || option.size() < 2 || option[0] != '-' ||
+        (option[1] >= '0' && option[1] <= '9'))
       break;
     line = ahead;
     if (option == "-o") {
       take_numbers(3, &map.offset);
     } else if (option == "-s") {
       take_numbers(3, &map.scale);
-    } else if (option == "-t" || option == "-mm" || option == "-bm" || option == "-boost" || option == "-texres") {
+    } else if (option == "-t" || option == "-mm" || option == "-bm" || option == "-boost" ||
+               option == "-texres") {
       take_numbers(option == "-t" ? 3 : option == "-mm" ? 2 : 1, nullptr);
       if (option != "-texres") notes.insert("the option " + std::string(option) + " of a map is not read");
     } else if (take_word(line, value)) {  // -clamp, -imfchan, -blendu, -blendv, -cc, -type
@@ -74,8 +76,8 @@ MtlMap* map_by(std::string_view word, MtlMaterial& entry) {
 
 }  // namespace
 
-void read_mtl(const std::filesystem::path& path, Budget& budget, std::map<std::string, MtlMaterial>& materials,
-              std::set<std::string>& notes) {
+void read_mtl(const std::filesystem::path& path, Budget& budget,
+              std::map<std::string, MtlMaterial>& materials, std::set<std::string>& notes) {
   const std::string text = read_text(path, budget);
   std::string_view rest = text, line, word;
   MtlMaterial unnamed, *entry = &unnamed;
@@ -119,8 +121,8 @@ void read_mtl(const std::filesystem::path& path, Budget& budget, std::map<std::s
     } else if (MtlMap* map = map_by(word, *entry)) {
       budget.charge(path.string(), 2 * line.size() + 64);
       *map = read_map(line, notes);
-    } else if (word.starts_with("map_") || word == "bump" || word == "norm" || word == "disp" || word == "decal" ||
-               word == "refl") {
+    } else if (word.starts_with("map_") || word == "bump" || word == "norm" || word == "disp" ||
+               word == "decal" || word == "refl") {
       notes.insert(std::string(word) + " is not read");
     }
   }

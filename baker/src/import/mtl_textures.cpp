@@ -11,12 +11,13 @@ namespace {
 // All that decides a texture, in one text.
 std::string key_of(const MtlMaterial& source, const MtlMap& map) {
   std::string key = (source.folder / map.file).string() + '\0' + map.channel + (map.clamp ? 'c' : 'r');
-  for (const double value : {map.scale.x, map.scale.y, map.offset.x, map.offset.y}) key += ' ' + std::to_string(value);
+  for (const double value : {map.scale.x, map.scale.y, map.offset.x, map.offset.y})
+    key += ' ' + std::to_string(value);
   return key;
 }
 
-// Puts the opacity map's values, at the nearest texel, where the colour map's alpha is. The result has the size of the
-// larger of both.
+// Puts the opacity map's values, at the nearest texel, where the colour map's alpha is. The result has the
+// size of the larger of both.
 Picture with_alpha(const Picture& color, const Picture& opacity, char channel) {
   Picture out;
   out.width = std::max(color.width, opacity.width);
@@ -24,7 +25,8 @@ Picture with_alpha(const Picture& color, const Picture& opacity, char channel) {
   out.has_alpha = true;
   out.rgba.resize(size_t{out.width} * out.height * 4, 255);
   const auto texel = [&](const Picture& from, uint32_t x, uint32_t y) {
-    const uint64_t column = uint64_t{x} * from.width / out.width, row = uint64_t{y} * from.height / out.height;
+    const uint64_t column = uint64_t{x} * from.width / out.width,
+                   row = uint64_t{y} * from.height / out.height;
     return &from.rgba[(row * from.width + column) * 4];
   };
   if (!channel) channel = opacity.has_alpha ? 'm' : 'l';
@@ -53,20 +55,23 @@ uint32_t MtlTextures::add(const MtlMaterial& source, std::map<uint32_t, Surface>
   const bool masked = !source.opacity.file.empty();
   if (!masked && material.opacity == 1) surface.alpha.mode = AlphaMode::kOpaque;
 
-  const auto [base, fresh] = known_.try_emplace(key_of(source, source.color) + key_of(source, source.opacity) +
-                                                std::to_string(material.opacity));
+  const auto [base, fresh] = known_.try_emplace(
+      key_of(source, source.color) + key_of(source, source.opacity) + std::to_string(material.opacity));
   if (fresh) {
     Picture color = read(source, source.color);
     // Colour and opacity are one texture; the alpha of a colour map says nothing (map_d does).
     if (!masked) {
-      if (color.has_alpha) builder_.note(file_ + ": the alpha of map_Kd is not read, map_d would say what is solid");
+      if (color.has_alpha)
+        builder_.note(file_ + ": the alpha of map_Kd is not read, map_d would say what is solid");
       for (size_t i = 3; i < color.rgba.size(); i += 4) color.rgba[i] = 255;
     } else if (const Picture opacity = read(source, source.opacity); !opacity.rgba.empty()) {
-      const uint64_t texels = uint64_t{std::max(color.width, opacity.width)} * std::max(color.height, opacity.height);
+      const uint64_t texels =
+          uint64_t{std::max(color.width, opacity.width)} * std::max(color.height, opacity.height);
       builder_.budget().charge(file_, texels, 4);
       color = with_alpha(color, opacity, source.opacity.channel);
     }
-    base->second = use(source.color.file.empty() ? source.opacity : source.color, std::move(color), surface.alpha);
+    base->second =
+        use(source.color.file.empty() ? source.opacity : source.color, std::move(color), surface.alpha);
   }
   surface.base = base->second;
   if (!source.emission.file.empty() && material.emission != glm::vec3(0)) {
@@ -95,7 +100,8 @@ Picture MtlTextures::read(const MtlMaterial& source, const MtlMap& map) {
     builder_.budget().release(bytes.size());
     break;
   }
-  if (picture.rgba.empty()) builder_.note(file_ + ": the picture " + map.file + " " + why + "; factors hold without it");
+  if (picture.rgba.empty())
+    builder_.note(file_ + ": the picture " + map.file + " " + why + "; factors hold without it");
   return picture;
 }
 

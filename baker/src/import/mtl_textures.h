@@ -15,8 +15,8 @@ class MtlTextures {
   // `file` names the mesh in errors and notes.
   MtlTextures(const std::string& file, MeshBuilder& builder) : file_(file), builder_(builder) {}
 
-  // Adds the material to the builder and, where it has textures that can be read, what they make of it to `surfaces`.
-  // Returns its number.
+  // Adds the material to the builder and, where it has textures that can be read, what they make of it to
+  // `surfaces`. Returns its number.
   uint32_t add(const MtlMaterial& source, std::map<uint32_t, Surface>& surfaces);
 
  private:

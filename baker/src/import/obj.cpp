@@ -1,4 +1,5 @@
-// Wavefront OBJ: polygons, normals, materials, texture coordinates, vertex colours. Lines, points, curves and surfaces hold no triangles.
+// Wavefront OBJ: polygons, normals, materials, texture coordinates, vertex colours. Lines, points, curves and
+// surfaces hold no triangles.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -131,7 +132,8 @@ class ObjReader {
         if (second != word.npos) normal = resolve(word.substr(second + 1), soup_.normals.size());
       }
       if (texcoord != kNoIndex || !soup_.corner_texcoords.empty()) {
-        while (soup_.corner_texcoords.size() + 1 < soup_.corners.size()) push(soup_.corner_texcoords, kNoIndex);
+        while (soup_.corner_texcoords.size() + 1 < soup_.corners.size())
+          push(soup_.corner_texcoords, kNoIndex);
         push(soup_.corner_texcoords, texcoord);
       }
       if (normal != kNoIndex || !soup_.corner_normals.empty()) {

@@ -63,7 +63,8 @@ Picture decode_stb(const std::string& file, std::string_view bytes, Budget& budg
   int width = 0, height = 0, channels = 0;
   bytes_left = uint64_t{1} << 20;
   why = "is of no format known here, or damaged";
-  if (bytes.size() > 0x7FFFFFFF || !stbi_info_from_memory(data, int(bytes.size()), &width, &height, &channels))
+  if (bytes.size() > 0x7FFFFFFF ||
+      !stbi_info_from_memory(data, int(bytes.size()), &width, &height, &channels))
     return {};
   const uint64_t texels = uint64_t(width) * uint64_t(height);
   budget.charge(file, texels, 16);

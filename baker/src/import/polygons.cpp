@@ -106,7 +106,8 @@ void cut_faces(const std::string& file, const PolygonSoup& soup, MeshBuilder& bu
     cut.clear();
     if (polygon.size() == end - begin) {
       crossed += triangulate(polygon, cut, work) == EarCut::kCrossed;
-    } else {  // a triangle, or one where the builder rejects what touches the missing corner, and keeps the rest
+    } else {  // a triangle, or one where the builder rejects what touches the missing corner, and keeps the
+              // rest
       for (uint32_t i = 2; i < end - begin; ++i) cut.push_back({0, i - 1, i});
     }
     for (const glm::uvec3& local : cut) add(Piece{face, local + begin});
@@ -133,20 +134,24 @@ std::vector<TriangleColor> piece_colors(const PolygonSoup& soup, std::span<const
     Surface surface{plain.base_color, plain.emission, {AlphaMode::kBlend, plain.opacity}, {}, {}};
     // A grey that stands for no material must not darken what the vertices say.
     if (by_vertex && builder.is_default(material)) surface.base_color = glm::vec3(1);
-    if (const auto found = soup.surfaces.find(material); found != soup.surfaces.end()) surface = found->second;
-    const std::vector<TriangleColor> own = mean_colors(surface, list.size(), [&](size_t t, SurfaceCorner(&out)[3]) {
-      const Piece& piece = pieces[list[t]];
-      for (int i = 0; i < 3; ++i) {
-        const uint32_t corner = piece.corners[i];
-        const uint32_t uv = corner < soup.corner_texcoords.size() ? soup.corner_texcoords[corner] : kNoIndex;
-        const glm::dvec2 at = uv < soup.texcoords.size() ? soup.texcoords[uv] : glm::dvec2(0);
-        out[i].base_uv = surface.base.place(at);
-        out[i].glow_uv = surface.glow.place(at);
-        out[i].color = glm::vec4(1);
-        if (soup.corners[corner] < soup.colors.size()) out[i].color = {soup.colors[soup.corners[corner]], 1};
-        if (piece.face < soup.face_colors.size()) out[i].color = {soup.face_colors[piece.face], 1};
-      }
-    });
+    if (const auto found = soup.surfaces.find(material); found != soup.surfaces.end())
+      surface = found->second;
+    const std::vector<TriangleColor> own =
+        mean_colors(surface, list.size(), [&](size_t t, SurfaceCorner(&out)[3]) {
+          const Piece& piece = pieces[list[t]];
+          for (int i = 0; i < 3; ++i) {
+            const uint32_t corner = piece.corners[i];
+            const uint32_t uv =
+                corner < soup.corner_texcoords.size() ? soup.corner_texcoords[corner] : kNoIndex;
+            const glm::dvec2 at = uv < soup.texcoords.size() ? soup.texcoords[uv] : glm::dvec2(0);
+            out[i].base_uv = surface.base.place(at);
+            out[i].glow_uv = surface.glow.place(at);
+            out[i].color = glm::vec4(1);
+            if (soup.corners[corner] < soup.colors.size())
+              out[i].color = {soup.colors[soup.corners[corner]], 1};
+            if (piece.face < soup.face_colors.size()) out[i].color = {soup.face_colors[piece.face], 1};
+          }
+        });
     for (size_t i = 0; i < list.size(); ++i) colors[list[i]] = own[i];
   }
   return colors;
@@ -169,7 +174,8 @@ void add_polygons(const std::string& file, const PolygonSoup& soup, MeshBuilder&
     builder.add(triangle, normals, material_of(soup, piece.face), color);
   };
   if (soup.has_colors()) {
-    builder.budget().charge(file, soup.triangle_count(), sizeof(Piece) + 2 * sizeof(TriangleColor) + sizeof(uint32_t));
+    builder.budget().charge(file, soup.triangle_count(),
+                            sizeof(Piece) + 2 * sizeof(TriangleColor) + sizeof(uint32_t));
     std::vector<Piece> pieces;
     pieces.reserve(soup.triangle_count());
     cut_faces(file, soup, builder, [&](const Piece& piece) { pieces.push_back(piece); });

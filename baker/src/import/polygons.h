@@ -24,12 +24,12 @@ struct PolygonSoup {
   std::vector<uint32_t> materials;       // per face; empty: all `material`
   uint32_t material = 0;
   // What gives triangles colours of their own; all empty where nothing does.
-  std::vector<glm::dvec2> texcoords;      // their origin at the picture's upper left
+  std::vector<glm::dvec2> texcoords;       // their origin at the picture's upper left
   std::vector<uint32_t> corner_texcoords;  // into texcoords (kNoIndex: none); empty or as long as corners
   std::vector<glm::vec3> colors;           // per position, linear
   std::vector<glm::vec3> face_colors;      // per face, linear
   std::map<uint32_t, Surface> surfaces;    // of materials with textures
-  uint64_t too_small = 0;  // faces with fewer than three corners, not in the lists
+  uint64_t too_small = 0;                  // faces with fewer than three corners, not in the lists
 
   // Ends a face whose corners were appended since the last one. One with fewer than three is dropped and
   // counted: it holds no triangle. True where it was kept.

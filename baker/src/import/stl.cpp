@@ -23,8 +23,8 @@ uint32_t binary_count(std::string_view bytes) {
   return count;
 }
 
-// Whether this is text. Binary headers may start with "solid" too; no line behind them then starts with a facet, or
-// the end of the solid.
+// Whether this is text. Binary headers may start with "solid" too; no line behind them then starts with a
+// facet, or the end of the solid.
 bool looks_ascii(std::string_view bytes) {
   constexpr size_t kLook = 65536;
   std::string_view rest = bytes.substr(0, kLook), line, word;
@@ -45,14 +45,15 @@ bool is_plausible(std::string_view triangle) {
   std::memcpy(corners, triangle.data() + sizeof(glm::vec3), sizeof corners);
   bool some = false;
   for (const float value : corners) {
-    if (!std::isfinite(value) || std::abs(value) > 1e20f || (value != 0 && std::abs(value) < 1e-20f)) return false;
+    if (!std::isfinite(value) || std::abs(value) > 1e20f || (value != 0 && std::abs(value) < 1e-20f))
+      return false;
     some = some || value != 0;
   }
   return some;
 }
 
-// How many triangles a binary file holds. Writers that stream leave the count 0 or at its largest, others count
-// wrong; where whole triangles fill the file up, these are what was meant.
+// How many triangles a binary file holds. Writers that stream leave the count 0 or at its largest, others
+// count wrong; where whole triangles fill the file up, these are what was meant.
 uint32_t count_triangles(const std::string& file, std::string_view bytes, MeshBuilder& builder) {
   const uint64_t declared = binary_count(bytes), fits = (bytes.size() - kHeaderBytes) / kTriangleBytes;
   const bool whole = (bytes.size() - kHeaderBytes) % kTriangleBytes == 0;
@@ -97,7 +98,8 @@ void read_binary(const std::string& file, std::string_view bytes, uint32_t count
     const char* attribute = bytes.data() + kHeaderBytes + i * kTriangleBytes + sizeof vectors;
     attributes = attributes || attribute[0] || attribute[1];
   }
-  if (attributes) builder.note(file + ": attribute bytes of triangles (colours, in some programs) are not read");
+  if (attributes)
+    builder.note(file + ": attribute bytes of triangles (colours, in some programs) are not read");
 }
 
 glm::dvec3 read_vector(std::string_view line) {
@@ -141,7 +143,8 @@ void read_stl(const std::filesystem::path& path, MeshBuilder& builder) {
   PolygonSoup soup;
   soup.material = builder.default_material();
   const bool has_header = bytes.size() >= kHeaderBytes;
-  const bool fits = has_header && bytes.size() == kHeaderBytes + kTriangleBytes * uint64_t{binary_count(bytes)};
+  const bool fits =
+      has_header && bytes.size() == kHeaderBytes + kTriangleBytes * uint64_t{binary_count(bytes)};
   if (!fits && looks_ascii(bytes)) {
     const std::string text = read_text(path, builder.budget());
     read_ascii(file, text, soup, builder);

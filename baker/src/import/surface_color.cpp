@@ -75,7 +75,8 @@ class Footprint {
     const glm::dvec2 extent = glm::max(at_[0], glm::max(at_[1], at_[2])) - low;
     longest_ = std::max(extent.x, extent.y);
     area_ = std::abs(cross(at_[1] - at_[0], at_[2] - at_[0])) / 2;
-    usable_ = std::isfinite(area_) && std::isfinite(longest_) && std::abs(low.x) < 1e12 && std::abs(low.y) < 1e12;
+    usable_ =
+        std::isfinite(area_) && std::isfinite(longest_) && std::abs(low.x) < 1e12 && std::abs(low.y) < 1e12;
     small_ = !(area_ >= 1) && (!use.nearest || area_ < 1e-9);
     while (!small_ && level_ + 1 < use.texture->levels() && !fits(most_texels)) ++level_;
     if (!small_ && !fits(most_texels)) usable_ = false;
@@ -84,8 +85,8 @@ class Footprint {
   // The level whose texels visit() looks at.
   size_t level() const { return usable_ ? small_ ? 0 : level_ : use_.texture->levels() - 1; }
 
-  // Calls visit(share of the area, weights, texel) for the pieces of the triangle. `alpha`, where there is one, gives the
-  // vertices' at a place: then the finest level alone is right.
+  // Calls visit(share of the area, weights, texel) for the pieces of the triangle. `alpha`, where there is
+  // one, gives the vertices' at a place: then the finest level alone is right.
   template <typename Alpha, typename Visit>
   void visit(const Alpha& alpha, const Visit& visit) const {
     const Texture& texture = *use_.texture;
@@ -100,7 +101,9 @@ class Footprint {
     Cut whole{{at_[0] * scale, at_[1] * scale, at_[2] * scale}, 3};
     const glm::dvec2 a = whole.corners[0], ab = whole.corners[1] - a, ac = whole.corners[2] - a;
     const double doubled = cross(ab, ac);
-    const auto weights_of = [&](const glm::dvec2& p) { return Weights(cross(p - a, ac), cross(ab, p - a)) / doubled; };
+    const auto weights_of = [&](const glm::dvec2& p) {
+      return Weights(cross(p - a, ac), cross(ab, p - a)) / doubled;
+    };
     const auto range = [](const Cut& cut, int axis) {
       double low = INFINITY, high = -INFINITY;
       for (int i = 0; i < cut.count; ++i) {
@@ -132,7 +135,8 @@ class Footprint {
     const glm::dvec2 at = at_[0] + w.x * (at_[1] - at_[0]) + w.y * (at_[2] - at_[0]);
     if (!usable_ || !std::isfinite(at.x) || !std::isfinite(at.y)) return glm::vec4(0, 0, 0, 1);
     if (use_.nearest)
-      return use_.texture->texel(0, int64_t(std::floor(at.x)), int64_t(std::floor(at.y)), use_.wrap_x, use_.wrap_y);
+      return use_.texture->texel(0, int64_t(std::floor(at.x)), int64_t(std::floor(at.y)), use_.wrap_x,
+                                 use_.wrap_y);
     return use_.texture->bilinear(at, use_.wrap_x, use_.wrap_y);
   }
 
@@ -171,8 +175,9 @@ class Mean {
     add_base(together ? glow.get() : nullptr);
     if (glows && !together) {
       const std::function<float(Weights)> no_alpha;
-      glow->visit(no_alpha,
-                  [&](double share, const Weights&, const glm::vec4& texel) { glow_ += share * glm::dvec3(texel); });
+      glow->visit(no_alpha, [&](double share, const Weights&, const glm::vec4& texel) {
+        glow_ += share * glm::dvec3(texel);
+      });
     }
     TriangleColor out;
     out.coverage = float(std::min(1.0, coverage_));
@@ -185,13 +190,15 @@ class Mean {
 
  private:
   glm::vec4 vertex_color(const Weights& w) const {
-    return corners_[0].color * float(1 - w.x - w.y) + corners_[1].color * float(w.x) + corners_[2].color * float(w.y);
+    return corners_[0].color * float(1 - w.x - w.y) + corners_[1].color * float(w.x) +
+           corners_[2].color * float(w.y);
   }
 
   void add_base(const Footprint* glow) {
     const bool by_vertex = !solid_ && surface_.alpha.mode != AlphaMode::kOpaque;
     std::function<float(Weights)> alpha;
-    if (by_vertex && surface_.alpha.mode == AlphaMode::kMask) alpha = [&](const Weights& w) { return vertex_color(w).a; };
+    if (by_vertex && surface_.alpha.mode == AlphaMode::kMask)
+      alpha = [&](const Weights& w) { return vertex_color(w).a; };
     const auto add = [&](double share, const Weights& w, glm::vec4 texel) {
       const glm::vec4 color = plain_ ? glm::vec4(1) : vertex_color(w);
       if (by_vertex && !alpha) texel *= color.a;
@@ -224,7 +231,8 @@ class Mean {
 
 std::vector<TriangleColor> mean_colors(const Surface& surface, size_t count,
                                        const std::function<void(size_t, SurfaceCorner (&)[3])>& corners_of) {
-  const double most_texels = std::clamp(kTexelsOfAll / std::max(1.0, double(count)), kFewestTexels, kMostTexels);
+  const double most_texels =
+      std::clamp(kTexelsOfAll / std::max(1.0, double(count)), kFewestTexels, kMostTexels);
   // The levels that some triangle will look at are made before the threads start.
   const auto make_levels = [&](const TextureUse& use, glm::dvec2 SurfaceCorner::*uv) {
     if (!use.texture) return;

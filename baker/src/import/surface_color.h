@@ -36,10 +36,10 @@ struct SurfaceCorner {
   glm::vec4 color{1};                 // of the vertex, linear
 };
 
-// The means over `count` triangles, whose corners `corners_of` gives (called from several threads). Exact but for
-// pictures too fine for a triangle, of which a coarser level is taken: one triangle looks at 4,096 texels at most,
-// all together at a million or 64 each. A triangle smaller than a texel takes the mean between texels. Colour and
-// emission are those of the solid part where a triangle is partly there.
+// The means over `count` triangles, whose corners `corners_of` gives (called from several threads). Exact but
+// for pictures too fine for a triangle, of which a coarser level is taken: one triangle looks at 4,096 texels
+// at most, all together at a million or 64 each. A triangle smaller than a texel takes the mean between
+// texels. Colour and emission are those of the solid part where a triangle is partly there.
 std::vector<TriangleColor> mean_colors(const Surface& surface, size_t count,
                                        const std::function<void(size_t, SurfaceCorner (&)[3])>& corners_of);
 

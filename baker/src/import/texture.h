@@ -30,8 +30,8 @@ enum class Wrap : uint8_t { kRepeat, kClamp, kMirror };
 // A value of the sRGB curve, 0 to 1, in linear light.
 double linear_of_srgb(double value);
 
-// A picture's texels as (colour * coverage, coverage), and levels that each halve the one before by the mean over
-// areas, so that every level has the same mean.
+// A picture's texels as (colour * coverage, coverage), and levels that each halve the one before by the mean
+// over areas, so that every level has the same mean.
 class Texture {
  public:
   Texture(Picture picture, const AlphaRule& rule);
