@@ -156,6 +156,7 @@ Json provenance(const Arguments& a, const Mesh& mesh, const std::vector<std::str
   return {{"generator", std::string("lsp-bake ") + kProgramVersion},
           {"inputs", inputs},
           {"sources", sources},
+          {"origin", {mesh.origin.x, mesh.origin.y, mesh.origin.z}},
           {"source_hash", hex128(source[0], source[1])},
           {"options",
            {{"base", a.base},
@@ -304,6 +305,7 @@ Exit run(Arguments a) {
       sections.push_back({{"name", s.name}, {"bytes", s.bytes}, {"stored_bytes", s.stored_bytes}});
     Json report = {{"output", a.output.string()},
                    {"triangles", meta["triangles"]},
+                   {"origin", meta["origin"]},
                    {"notes", mesh.notes},
                    {"skipped", baked.skipped},
                    {"error", meta["error"]},

@@ -15,8 +15,9 @@ Mesh coloured(size_t count) {
   for (size_t t = 0; t < count; ++t) {
     mesh.triangles.push_back({0, 1, 2});
     mesh.material_ids.push_back(0);
-    mesh.colors.push_back({glm::vec3(float(t % 100) / 100, float(t / 100 % 100) / 100, float(t / 10000) / 100),
-                           glm::vec3(0, float(t % 7), 0), t % 2 ? 1.0f : 0.5f});
+    mesh.colors.push_back(
+        {glm::vec3(float(t % 100) / 100, float(t / 100 % 100) / 100, float(t / 10000) / 100),
+         glm::vec3(0, float(t % 7), 0), t % 2 ? 1.0f : 0.5f});
   }
   return mesh;
 }
@@ -56,7 +57,7 @@ TEST(ColorMaterials, AreBoundedInNumberAndNearTheirColours) {
   make_color_materials(mesh);
   EXPECT_LE(mesh.materials.size(), 65'536u);
   EXPECT_GT(mesh.materials.size(), 10'000u);
-  EXPECT_LT(largest_error(mesh), 0.04f);
+  EXPECT_LT(largest_error(mesh), 0.08f) << "four bits at the coarsest";
 }
 
 }  // namespace

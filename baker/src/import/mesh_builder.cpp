@@ -1,10 +1,8 @@
 #include "import/mesh_builder.h"
 
-#include <sys/random.h>
 #include <xxhash.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstring>
 
@@ -36,21 +34,7 @@ glm::dvec3 geometric_normal(const glm::dvec3& a, const glm::dvec3& b, const glm:
   return direction_of(glm::cross(b - a, c - a));
 }
 
-// A key of this process: whoever writes a mesh cannot know which positions collide, and make welding take a
-// time that grows with the square of their number. What is welded does not depend on it.
-uint64_t hash_key() {
-  static const uint64_t key = [] {
-    uint64_t random = 0;
-    if (getrandom(&random, sizeof random, GRND_NONBLOCK) != sizeof random) {
-      random = uint64_t(std::chrono::steady_clock::now().time_since_epoch().count());
-    }
-    return random;
-  }();
-  return key;
-}
-
-template <typename Vector>
-uint64_t hash_of(const Vector& p) {
+uint64_t hash_of(const glm::dvec3& p) {
   return XXH3_64bits_withSeed(&p, sizeof p, hash_key());
 }
 

@@ -1,8 +1,11 @@
 #include "import/rounding.h"
 
+#include <sys/random.h>
+#include <xxhash.h>
+
 #include <algorithm>
+#include <chrono>
 #include <cmath>
-#include <tuple>
 
 namespace lsp {
 namespace {
@@ -17,33 +20,24 @@ double largest(const glm::dvec3& v) {
   return std::max(std::abs(v.x), std::max(std::abs(v.y), std::abs(v.z)));
 }
 
-// For every position the number of the first that is equal to it.
-std::vector<uint32_t> first_equals(const std::vector<glm::vec3>& positions) {
-  std::vector<uint32_t> order(positions.size()), first(positions.size());
-  for (uint32_t i = 0; i < order.size(); ++i) order[i] = i;
-  const auto key = [&](uint32_t i) { return std::tuple(positions[i].x, positions[i].y, positions[i].z, i); };
-  std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return key(a) < key(b); });
-  for (size_t i = 0; i < order.size(); ++i) {
-    const bool same = i > 0 && positions[order[i]] == positions[order[i - 1]];
-    first[order[i]] = same ? first[order[i - 1]] : order[i];
-  }
-  return first;
-}
-
 // Leaves each position once.
 void weld(Mesh& mesh) {
-  const std::vector<uint32_t> first = first_equals(mesh.positions);
-  std::vector<uint32_t> place(first.size());
+  constexpr uint32_t kFree = 0xFFFFFFFFu;
+  size_t size = 1024;
+  while (size < 2 * mesh.positions.size()) size *= 2;
+  std::vector<uint32_t> slots(size, kFree), place(mesh.positions.size());
   uint32_t kept = 0;
-  for (uint32_t i = 0; i < first.size(); ++i) {
-    if (first[i] == i) {
-      place[i] = kept;
-      mesh.positions[kept++] = mesh.positions[i];
-    } else {
-      place[i] = place[first[i]];
+  for (size_t i = 0; i < place.size(); ++i) {
+    const glm::vec3 p = mesh.positions[i];
+    size_t slot = XXH3_64bits_withSeed(&p, sizeof p, hash_key()) & (size - 1);
+    while (slots[slot] != kFree && mesh.positions[slots[slot]] != p) slot = (slot + 1) & (size - 1);
+    if (slots[slot] == kFree) {
+      slots[slot] = kept;
+      mesh.positions[kept++] = p;
     }
+    place[i] = slots[slot];
   }
-  if (kept == first.size()) return;
+  if (kept == place.size()) return;
   mesh.positions.resize(kept);
   for (glm::uvec3& triangle : mesh.triangles)
     triangle = {place[triangle.x], place[triangle.y], place[triangle.z]};
@@ -82,13 +76,29 @@ void remove_triangles(Mesh& mesh, const std::vector<bool>& gone) {
 
 bool is_degenerate(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
   if (a == b || b == c || a == c) return true;
-  glm::dvec3 ab = b - a, ac = c - a, bc = c - b;
-  // Scaled, so that no square over- or underflows.
-  const double scale = std::max(largest(ab), std::max(largest(ac), largest(bc)));
-  ab /= scale, ac /= scale, bc /= scale;
-  const glm::dvec3 cross = glm::cross(ab, ac);
-  const double longest = std::max(glm::dot(ab, ab), std::max(glm::dot(ac, ac), glm::dot(bc, bc)));
-  return 0.5 * std::sqrt(glm::dot(cross, cross)) < kDegenerateArea * longest;
+  const auto flat = [](const glm::dvec3& ab, const glm::dvec3& ac) {
+    const glm::dvec3 bc = ac - ab, cross = glm::cross(ab, ac);
+    const double longest = std::max(glm::dot(ab, ab), std::max(glm::dot(ac, ac), glm::dot(bc, bc)));
+    return 0.5 * std::sqrt(glm::dot(cross, cross)) < kDegenerateArea * longest;
+  };
+  const double scale = std::max(largest(b - a), largest(c - a));
+  // Where a fourth power would over- or underflow.
+  constexpr double kSmall = 1e-60, kLarge = 1e60;
+  if (scale < kSmall || scale > kLarge) return flat((b - a) / scale, (c - a) / scale);
+  return flat(b - a, c - a);
+}
+
+// A key of this process: whoever writes a mesh cannot know which positions collide, and make welding take a
+// time that grows with the square of their number. What is welded does not depend on it.
+uint64_t hash_key() {
+  static const uint64_t key = [] {
+    uint64_t random = 0;
+    if (getrandom(&random, sizeof random, GRND_NONBLOCK) != sizeof random) {
+      random = uint64_t(std::chrono::steady_clock::now().time_since_epoch().count());
+    }
+    return random;
+  }();
+  return key;
 }
 
 [[gnu::noinline]] glm::vec3 rounded(const glm::dvec3& p) { return glm::vec3(p); }
