@@ -333,6 +333,9 @@ Exit run(Arguments a) {
                   " with an index out of range, %" PRIu64 " too small, %" PRIu64 " wholly transparent\n",
                   mesh.rejected.degenerate, mesh.rejected.non_finite, mesh.rejected.out_of_range,
                   mesh.rejected.collapsed, mesh.rejected.invisible);
+    if (mesh.origin != glm::dvec3(0))
+      std::printf("origin      %.17g %.17g %.17g: positions, rays and hits are relative to it\n",
+                  mesh.origin.x, mesh.origin.y, mesh.origin.z);
     for (const std::string& note : mesh.notes) std::printf("note        %s\n", note.c_str());
     std::printf("tree        %u nodes, %u triangle records, depth %u\n", baked.header.node_count,
                 baked.header.triangle_count, baked.header.max_depth);

@@ -34,9 +34,7 @@ glm::dvec3 geometric_normal(const glm::dvec3& a, const glm::dvec3& b, const glm:
   return direction_of(glm::cross(b - a, c - a));
 }
 
-uint64_t hash_of(const glm::dvec3& p) {
-  return XXH3_64bits_withSeed(&p, sizeof p, hash_key());
-}
+uint64_t hash_of(const glm::dvec3& p) { return XXH3_64bits_withSeed(&p, sizeof p, hash_key()); }
 
 }  // namespace
 
@@ -297,13 +295,6 @@ void MeshBuilder::note(const std::string& text) {
 Mesh MeshBuilder::take() {
   if (mesh_.materials.empty()) default_material();
   mesh_.origin = choose_origin(exact_);
-  if (mesh_.origin != glm::dvec3(0)) {
-    char text[200];
-    std::snprintf(text, sizeof text,
-                  "positions are about the origin (%.17g, %.17g, %.17g), as single precision would move them",
-                  mesh_.origin.x, mesh_.origin.y, mesh_.origin.z);
-    note(text);
-  }
   round_positions(exact_, mesh_);
   const Rejected& rejected = mesh_.rejected;
   const std::pair<uint64_t, const char*> left_out[] = {
