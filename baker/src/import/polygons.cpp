@@ -8,7 +8,7 @@ namespace lsp {
 namespace {
 
 // Point tests allowed for one file's concave polygons: seconds.
-constexpr uint64_t kEarWork = 1'000'000'000;
+constexpr uint64_t kEarWork = 300'000'000;
 
 double area2(const glm::dvec2& a, const glm::dvec2& b, const glm::dvec2& c) {
   return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
