@@ -12,8 +12,10 @@
 #include <sstream>
 
 #include "bake.h"
+#include "color_materials.h"
 #include "error.h"
 #include "import/import.h"
+#include "import/source_file.h"
 #include "lsp/command_line.h"
 #include "writer.h"
 
@@ -50,6 +52,8 @@ struct Arguments {
   bool no_splits = false;
   std::string preset = "balanced";
   double max_error = 0;  // per cent of rays, 0: not asked for
+  bool strict = false;
+  std::filesystem::path depfile;
   bool resolution_given = false, depth_given = false, samples_given = false;
   CommonOptions common;
 };
@@ -95,13 +99,55 @@ Json to_json(const MeasuredError& e) {
           {"depth_error_percent_of_diagonal", 100 * e.depth_error}};
 }
 
+// The path of a source relative to the folder of the input that led to it.
+std::string name_beside(const std::filesystem::path& file, const std::filesystem::path& input) {
+  const std::filesystem::path folder = input.parent_path();
+  const std::filesystem::path relative = folder.empty() ? file : file.lexically_relative(folder);
+  return printable((relative.empty() ? file : relative).generic_string());
+}
+
+std::vector<std::string> names_of(const std::vector<Material>& materials) {
+  std::vector<std::string> names;
+  for (const Material& material : materials) names.push_back(material.name);
+  return names;
+}
+
+// --strict: what is not read, or not as it stands, is an error.
+[[noreturn]] void refuse_notes(const Mesh& mesh) {
+  for (const std::string& note : mesh.notes) std::fprintf(stderr, "lsp-bake: note: %s\n", note.c_str());
+  throw Failure(Exit::kInvalid, mesh.sources.front().front().string(),
+                "led to " + std::to_string(mesh.notes.size()) +
+                    " notes, which --strict refuses: mend the input or leave out --strict");
+}
+
+// A rule for Make and Ninja: the output depends on every file that was read.
+void write_depfile(const Arguments& a, const Mesh& mesh) {
+  const auto escaped = [](const std::filesystem::path& path) {
+    std::string text;
+    for (const char c : path.string()) {
+      if (c == ' ' || c == '#') text += '\\';
+      if (c == '$') text += '$';
+      text += c;
+    }
+    return text;
+  };
+  std::string rule = escaped(a.output) + ":";
+  for (const auto& files : mesh.sources) {
+    for (const auto& file : files) rule += " \\\n  " + escaped(file);
+  }
+  write_text(a.depfile, rule + "\n");
+}
+
 // Provenance: nothing in it depends on the machine, the time, the threads or the folder.
-Json provenance(const Arguments& a, const Mesh& mesh, const std::array<uint64_t, 2>& source,
-                const MeasuredError& error) {
+Json provenance(const Arguments& a, const Mesh& mesh, const std::vector<std::string>& material_names,
+                const std::array<uint64_t, 2>& source, const MeasuredError& error) {
   Json inputs = Json::array();
-  for (const auto& p : a.inputs) inputs.push_back(p.filename().string());
-  Json materials = Json::array();
-  for (const Material& m : mesh.materials) materials.push_back(m.name);
+  for (const auto& p : a.inputs) inputs.push_back(printable(p.filename().string()));
+  Json sources = Json::array();
+  for (const auto& files : mesh.sources) {
+    Json& list = sources.emplace_back(Json::array());
+    for (const auto& file : files) list.push_back(name_beside(file, files[0]));
+  }
   static const std::map<Purpose, const char*> kPurposes = {{Purpose::kVisibility, "visibility"},
                                                            {Purpose::kAo, "ao"},
                                                            {Purpose::kDiffuse, "diffuse"},
@@ -109,6 +155,8 @@ Json provenance(const Arguments& a, const Mesh& mesh, const std::array<uint64_t,
                                                            {Purpose::kAll, "all"}};
   return {{"generator", std::string("lsp-bake ") + kProgramVersion},
           {"inputs", inputs},
+          {"sources", sources},
+          {"origin", {mesh.origin.x, mesh.origin.y, mesh.origin.z}},
           {"source_hash", hex128(source[0], source[1])},
           {"options",
            {{"base", a.base},
@@ -132,9 +180,11 @@ Json provenance(const Arguments& a, const Mesh& mesh, const std::array<uint64_t,
             {"kept", mesh.triangles.size()},
             {"degenerate", mesh.rejected.degenerate},
             {"non_finite", mesh.rejected.non_finite},
-            {"out_of_range", mesh.rejected.out_of_range}}},
+            {"out_of_range", mesh.rejected.out_of_range},
+            {"collapsed", mesh.rejected.collapsed},
+            {"invisible", mesh.rejected.invisible}}},
           {"error", to_json(error)},
-          {"materials", materials}};
+          {"materials", material_names}};
 }
 
 Exit run(Arguments a) {
@@ -176,8 +226,11 @@ Exit run(Arguments a) {
   ImportOptions import_options;
   import_options.memory_limit = a.memory_limit;
   import_options.crease_angle_degrees = a.crease_angle;
-  const Mesh mesh = import_meshes(a.inputs, import_options);
-  const auto source = hash_inputs(a.inputs);
+  Mesh mesh = import_meshes(a.inputs, import_options);
+  if (a.strict && !mesh.notes.empty()) refuse_notes(mesh);
+  const auto source = hash_sources(mesh);
+  const std::vector<std::string> material_names = names_of(mesh.materials);
+  make_color_materials(mesh);
   const double import_seconds = timer();
 
   BakeOptions options;
@@ -237,9 +290,10 @@ Exit run(Arguments a) {
   timer();
 
   bar.show("write", 0);
-  const Json meta = provenance(a, mesh, source, error);
+  const Json meta = provenance(a, mesh, material_names, source, error);
   const Written written =
       write_lsp(a.output, baked, meta.dump(), {a.align, a.compress == "zstd", 12, a.memory_limit});
+  if (!a.depfile.empty()) write_depfile(a, mesh);
   const double write_seconds = timer();
   bar.clear();
 
@@ -251,6 +305,7 @@ Exit run(Arguments a) {
       sections.push_back({{"name", s.name}, {"bytes", s.bytes}, {"stored_bytes", s.stored_bytes}});
     Json report = {{"output", a.output.string()},
                    {"triangles", meta["triangles"]},
+                   {"origin", meta["origin"]},
                    {"notes", mesh.notes},
                    {"skipped", baked.skipped},
                    {"error", meta["error"]},
@@ -275,8 +330,12 @@ Exit run(Arguments a) {
     std::printf("read        %" PRIu64 " triangles, kept %zu\n", mesh.primitive_count, mesh.triangles.size());
     if (mesh.rejected.total())
       std::printf("dropped     %" PRIu64 " degenerate, %" PRIu64 " non-finite, %" PRIu64
-                  " with an index out of range\n",
-                  mesh.rejected.degenerate, mesh.rejected.non_finite, mesh.rejected.out_of_range);
+                  " with an index out of range, %" PRIu64 " too small, %" PRIu64 " wholly transparent\n",
+                  mesh.rejected.degenerate, mesh.rejected.non_finite, mesh.rejected.out_of_range,
+                  mesh.rejected.collapsed, mesh.rejected.invisible);
+    if (mesh.origin != glm::dvec3(0))
+      std::printf("origin      %.17g %.17g %.17g: positions, rays and hits are relative to it\n",
+                  mesh.origin.x, mesh.origin.y, mesh.origin.z);
     for (const std::string& note : mesh.notes) std::printf("note        %s\n", note.c_str());
     std::printf("tree        %u nodes, %u triangle records, depth %u\n", baked.header.node_count,
                 baked.header.triangle_count, baked.header.max_depth);
@@ -371,6 +430,9 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0.0f, 1e6f));
   app.add_option("--crease-angle", a.crease_angle, "Smooth normals are made up to this angle, in degrees")
       ->check(CLI::Range(0.0f, 180.0f));
+  app.add_flag("--strict", a.strict, "Refuse, with exit 3, an input that leads to any note");
+  app.add_option("--depfile", a.depfile,
+                 "Write a rule for Make and Ninja: OUT.lsp: every file that was read");
   app.add_flag("--no-splits", a.no_splits, "Build the tree without spatial splits");
   add_common_options(app, "lsp-bake", a.common);
   return run_program("lsp-bake", app, argc, argv, [&] {

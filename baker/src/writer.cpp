@@ -218,4 +218,10 @@ Written write_lsp(const std::filesystem::path& path, Baked& baked, const std::st
   return written;
 }
 
+void write_text(const std::filesystem::path& path, const std::string& text) {
+  TemporaryFile file(path);
+  file.write(text.data(), text.size());
+  file.commit();
+}
+
 }  // namespace lsp

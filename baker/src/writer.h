@@ -35,4 +35,7 @@ struct Written {
 Written write_lsp(const std::filesystem::path& path, Baked& baked, const std::string& meta,
                   const WriteOptions& options);
 
+// Writes a small file of text in the same way.
+void write_text(const std::filesystem::path& path, const std::string& text);
+
 }  // namespace lsp

@@ -35,7 +35,7 @@ Json expected(const Bytes& bytes, const std::vector<std::string>& arguments,
     if (arguments[i] == "--memory-limit") options.memory_limit = std::stoull(arguments[i + 1]);
     if (arguments[i] == "--mesh") {
       const std::filesystem::path sources[] = {folder / arguments[i + 1]};
-      options.source = format::hash_sources(sources);
+      options.source = format::hash_sources(sources, {});
     }
   }
   return to_json(check_file(bytes, options));

@@ -1,66 +1,63 @@
 #include "source.h"
 
-#include <lsp/program.h>
+#include <zstd.h>
 
-#include <cctype>
 #include <nlohmann/json.hpp>
 #include <string>
 
 #include "file.h"
+#include "view.h"
 
 namespace lsp::format {
 namespace {
 
-std::string percent_decoded(const std::string& uri) {
-  std::string text;
-  for (size_t i = 0; i < uri.size(); ++i) {
-    if (uri[i] == '%' && i + 2 < uri.size() && std::isxdigit(static_cast<unsigned char>(uri[i + 1])) &&
-        std::isxdigit(static_cast<unsigned char>(uri[i + 2]))) {
-      text += static_cast<char>(std::stoi(uri.substr(i + 1, 2), nullptr, 16));
-      i += 2;
-    } else {
-      text += uri[i];
+constexpr uint64_t kMaxMetaBytes = uint64_t{1} << 20;
+
+// META's text; empty where the file has none that can be read.
+std::string metadata(std::span<const std::byte> baked) {
+  for (const LspSection& section : view_file(baked).table) {
+    if (section.type != LSP_SECTION_META || section.bytes > kMaxMetaBytes ||
+        !in_range(section.offset, section.stored_bytes, baked.size()))
+      continue;
+    const auto* stored = reinterpret_cast<const char*>(baked.data()) + section.offset;
+    if (section.codec == LSP_CODEC_NONE) return {stored, section.stored_bytes};
+    std::string text(section.bytes, '\0');
+    const size_t size = ZSTD_decompress(text.data(), text.size(), stored, section.stored_bytes);
+    return ZSTD_isError(size) ? std::string() : text;
+  }
+  return {};
+}
+
+// Per input the names of its sources, itself first; empty where META does not say.
+std::vector<std::vector<std::string>> listed_sources(std::span<const std::byte> baked) {
+  std::vector<std::vector<std::string>> lists;
+  const nlohmann::json json = nlohmann::json::parse(metadata(baked), nullptr, false);
+  if (!json.is_object() || !json.contains("sources") || !json["sources"].is_array()) return lists;
+  for (const nlohmann::json& files : json["sources"]) {
+    std::vector<std::string>& list = lists.emplace_back();
+    if (!files.is_array()) continue;
+    for (const nlohmann::json& file : files) {
+      if (file.is_string()) list.push_back(file.get<std::string>());
     }
   }
-  return text;
-}
-
-// The files that the buffers of a .gltf file lie in, data URIs and GLB chunks left out.
-std::vector<std::filesystem::path> external_buffers(const std::filesystem::path& gltf,
-                                                    std::span<const std::byte> bytes) {
-  const auto* text = reinterpret_cast<const char*>(bytes.data());
-  const nlohmann::json json = nlohmann::json::parse(text, text + bytes.size(), nullptr, false);
-  if (!json.is_object())
-    throw Failure(Exit::kInvalid, gltf.string(), "is not JSON: it cannot be the source of a bake");
-  std::vector<std::filesystem::path> paths;
-  const auto buffers = json.find("buffers");
-  if (buffers == json.end() || !buffers->is_array()) return paths;
-  for (const nlohmann::json& buffer : *buffers) {
-    const auto uri = buffer.is_object() ? buffer.find("uri") : buffer.end();
-    if (!buffer.is_object() || uri == buffer.end() || !uri->is_string()) continue;
-    const std::string name = uri->get<std::string>();
-    if (!name.starts_with("data:")) paths.push_back(gltf.parent_path() / percent_decoded(name));
-  }
-  return paths;
-}
-
-bool is_gltf(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return extension == ".gltf";
+  return lists;
 }
 
 }  // namespace
 
-Hash128 hash_sources(std::span<const std::filesystem::path> inputs) {
+Hash128 hash_sources(std::span<const std::filesystem::path> inputs, std::span<const std::byte> baked) {
+  const std::vector<std::vector<std::string>> lists = listed_sources(baked);
   Hasher hasher;
-  for (const std::filesystem::path& input : inputs) {
-    const MappedFile file(input);
+  const auto add = [&](const std::filesystem::path& path) {
+    const MappedFile file(path);
     hasher.add(file.bytes().data(), file.bytes().size());
-    if (!is_gltf(input)) continue;
-    for (const std::filesystem::path& path : external_buffers(input, file.bytes())) {
-      const MappedFile buffer(path);
-      hasher.add(buffer.bytes().data(), buffer.bytes().size());
+  };
+  for (size_t i = 0; i < inputs.size(); ++i) {
+    add(inputs[i]);
+    for (size_t k = 1; i < lists.size() && k < lists[i].size(); ++k) {
+      const std::filesystem::path path = inputs[i].parent_path() / lists[i][k];
+      std::error_code error;
+      if (std::filesystem::is_regular_file(path, error)) add(path);
     }
   }
   return hasher.digest();

@@ -53,7 +53,7 @@ int validate(const Arguments& arguments, const CommonOptions& common) {
                                                   : Level::kStructure;
   options.memory_limit = arguments.memory_limit;
   options.examples_per_rule = arguments.examples;
-  if (!arguments.meshes.empty()) options.source = hash_sources(arguments.meshes);
+  if (!arguments.meshes.empty()) options.source = hash_sources(arguments.meshes, file.bytes());
   const Report report = check_file(file.bytes(), options);
   const Verdict verdict = report.verdict();
 

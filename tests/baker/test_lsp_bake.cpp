@@ -91,6 +91,38 @@ TEST_F(LspBake, ExitsAsTheErrorIs) {
   EXPECT_EQ(run("--help"), 0);
 }
 
+TEST_F(LspBake, NotesAreInTheReportAndStrictRefusesThem) {
+  ASSERT_EQ(run("grid.obj -o a.lsp --depth 3 --strict"), 0);
+  std::ofstream(folder_ / "lines.obj") << read("grid.obj") << "l 1 2\n";
+  ASSERT_EQ(run("lines.obj -o b.lsp --depth 3 --json"), 0);
+  const auto report = nlohmann::json::parse(read("out"));
+  ASSERT_EQ(report["notes"].size(), 1u);
+  EXPECT_NE(report["notes"][0].get<std::string>().find("1 lines, points"), std::string::npos);
+  EXPECT_EQ(run("lines.obj -o c.lsp --depth 3 --strict"), 3);
+  EXPECT_NE(read("err").find("1 lines, points"), std::string::npos);
+  EXPECT_FALSE(fs::exists(folder_ / "c.lsp"));
+}
+
+TEST_F(LspBake, EveryFileReadIsInTheHashAndTheDepfile) {
+  fs::create_directory(folder_ / "my scene");
+  std::ofstream(folder_ / "my scene/a.mtl") << "newmtl x\nKd 1 0 0\n";
+  std::ofstream(folder_ / "my scene/a.obj") << "mtllib a.mtl\nusemtl x\n" << read("grid.obj");
+  ASSERT_EQ(run("'my scene/a.obj' grid.obj -o a.lsp --depth 3 --depfile a.d"), 0);
+  EXPECT_EQ(read("a.d"), "a.lsp: \\\n  my\\ scene/a.obj \\\n  my\\ scene/a.mtl \\\n  grid.obj\n");
+  ASSERT_EQ(run("'my scene/a.obj' -o b.lsp --depth 3 --compress zstd"), 0);
+  const auto validate = [&](const std::string& file, const std::string& meshes) {
+    const std::string command = "cd '" + folder_.string() + "' && '" + LSP_BIN_DIR +
+                                "/lsp-validate' --quiet " + file + " --mesh " + meshes + " 2>/dev/null";
+    return WEXITSTATUS(std::system(command.c_str()));
+  };
+  EXPECT_EQ(validate("a.lsp", "'my scene/a.obj' grid.obj"), 0);
+  EXPECT_EQ(validate("a.lsp", "grid.obj 'my scene/a.obj'"), 7) << "the order counts";
+  EXPECT_EQ(validate("b.lsp", "'my scene/a.obj'"), 0);
+  std::ofstream(folder_ / "my scene/a.mtl") << "newmtl x\nKd 0 1 0\n";
+  EXPECT_EQ(validate("a.lsp", "'my scene/a.obj' grid.obj"), 7);
+  EXPECT_EQ(validate("b.lsp", "'my scene/a.obj'"), 7);
+}
+
 TEST_F(LspBake, KeepsWhatTheErrorAllows) {
   ASSERT_EQ(run("grid.obj -o a.lsp --max-error 20 --json"), 0);
   EXPECT_LE(nlohmann::json::parse(read("out"))["error"]["wrong_percent"], 20.0);

@@ -33,7 +33,7 @@ CheckOptions options_of(const InvalidFile& file) {
     if (file.arguments[i] == "--memory-limit") options.memory_limit = std::stoull(file.arguments[i + 1]);
     if (file.arguments[i] == "--mesh")
       options.source =
-          hash_sources(std::vector<std::filesystem::path>{kCorpus / "1.0/invalid" / file.arguments[i + 1]});
+          hash_sources(std::vector<std::filesystem::path>{kCorpus / "1.0/invalid" / file.arguments[i + 1]}, {});
   }
   return options;
 }

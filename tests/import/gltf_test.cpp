@@ -4,101 +4,13 @@
 #include <meshoptimizer.h>
 #include <xxhash.h>
 
-#include <nlohmann/json.hpp>
-
-#include "mesh_files.h"
+#include "gltf_builder.h"
 
 namespace {
 
 using lsp::Exit;
 using lsp::Mesh;
-using nlohmann::json;
 using namespace lsp_test;
-
-constexpr int kByte = 5120, kUbyte = 5121, kShort = 5122, kUshort = 5123, kUint = 5125, kFloat = 5126;
-
-std::string base64(const std::string& bytes) {
-  const char* digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string out;
-  for (size_t i = 0; i < bytes.size(); i += 3) {
-    uint32_t bits = 0;
-    for (size_t k = 0; k < 3; ++k) bits = bits << 8 | (i + k < bytes.size() ? uint8_t(bytes[i + k]) : 0u);
-    for (size_t k = 0; k < 4; ++k) out += i + k > bytes.size() ? '=' : digits[bits >> (18 - 6 * k) & 63];
-  }
-  return out;
-}
-
-// A document with one buffer that grows as accessors are added.
-struct Document {
-  json root = {{"asset", {{"version", "2.0"}}}};
-  std::string bytes;
-
-  int view(const std::string& data, int stride = 0) {
-    bytes.resize((bytes.size() + 3) / 4 * 4);
-    json view = {{"buffer", 0}, {"byteOffset", bytes.size()}, {"byteLength", data.size()}};
-    if (stride) view["byteStride"] = stride;
-    bytes += data;
-    root["bufferViews"].push_back(view);
-    return int(root["bufferViews"].size()) - 1;
-  }
-  int accessor(int view, int type, size_t count, const char* shape, size_t offset = 0,
-               bool normalized = false) {
-    json accessor = {{"componentType", type}, {"count", count}, {"type", shape}};
-    if (view >= 0) accessor["bufferView"] = view;
-    if (offset) accessor["byteOffset"] = offset;
-    if (normalized) accessor["normalized"] = true;
-    root["accessors"].push_back(accessor);
-    return int(root["accessors"].size()) - 1;
-  }
-  template <typename T>
-  int values(const std::vector<T>& list, int type, const char* shape, size_t components,
-             bool normalized = false) {
-    std::string data;
-    for (const T& value : list) append(data, value);
-    return accessor(view(data), type, list.size() / components, shape, 0, normalized);
-  }
-  int vec3(const std::vector<float>& list) { return values(list, kFloat, "VEC3", 3); }
-  template <typename T>
-  int indices(const std::vector<T>& list, int type) {
-    return values(list, type, "SCALAR", 1);
-  }
-  // Appends a mesh of one primitive and returns its number.
-  int mesh(const json& primitive) {
-    root["meshes"].push_back({{"primitives", {primitive}}});
-    return int(root["meshes"].size()) - 1;
-  }
-  int node(const json& node) {
-    root["nodes"].push_back(node);
-    return int(root["nodes"].size()) - 1;
-  }
-
-  std::string gltf() const {
-    json copy = root;
-    if (!bytes.empty()) {
-      copy["buffers"][0]["byteLength"] = bytes.size();
-      copy["buffers"][0]["uri"] = "data:application/gltf-buffer;base64," + base64(bytes);
-    }
-    return copy.dump();
-  }
-  std::string glb() const {
-    json copy = root;
-    copy["buffers"][0]["byteLength"] = bytes.size();
-    std::string text = copy.dump(), binary = bytes;
-    text.resize((text.size() + 3) / 4 * 4, ' ');
-    binary.resize((binary.size() + 3) / 4 * 4);
-    std::string out = "glTF";
-    for (const size_t word : {size_t{2}, 28 + text.size() + binary.size(), text.size(), size_t{0x4E4F534A}}) {
-      append(out, uint32_t(word));
-    }
-    out += text;
-    append(out, uint32_t(binary.size()));
-    append(out, uint32_t{0x004E4942});
-    return out + binary;
-  }
-};
-
-const std::vector<float> kTriangle = {0, 0, 0, 1, 0, 0, 0, 1, 0};
-const std::vector<float> kStrip = {0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0, 0, 2, 0};
 
 class Gltf : public MeshFiles {
  protected:
@@ -130,6 +42,58 @@ TEST_F(Gltf, ContainersGiveTheSameMesh) {
     EXPECT_EQ(corner(*mesh, 0, 1), glm::vec3(1, 0, 0));
     EXPECT_EQ(mesh->normals[0][2], glm::vec3(0, 0, 1)) << "flat without normals";
   }
+}
+
+TEST_F(Gltf, TheHeadersLengthEndsABinaryFileUnlessItIsWrong) {
+  const std::string glb = triangle().glb();
+  const auto with_length = [&](size_t length) {
+    std::string bytes = glb.substr(0, 8);
+    append(bytes, uint32_t(length));
+    return bytes + glb.substr(12);
+  };
+  EXPECT_TRUE(MeshFiles::import("a.glb", glb).notes.empty());
+  for (const std::string& tail : {std::string("   "), std::string(50, ' '), std::string(40, '\xFF')}) {
+    const Mesh mesh = MeshFiles::import("a.glb", glb + tail);
+    EXPECT_EQ(mesh.triangles.size(), 1u);
+    EXPECT_TRUE(has_note(mesh, std::to_string(tail.size()) + " bytes after its end"));
+  }
+  for (const size_t length : {size_t{0}, size_t{12}, glb.size() - 40, glb.size() + 99, size_t{0xFFFFFFFF}}) {
+    const Mesh mesh = MeshFiles::import("a.glb", with_length(length));
+    EXPECT_EQ(mesh.triangles.size(), 1u) << length;
+    EXPECT_TRUE(has_note(mesh, "wrong length")) << length;
+  }
+}
+
+TEST_F(Gltf, UrisAsExportersWriteThem) {
+  Document document = triangle();
+  std::filesystem::create_directory(folder_ / "sub");
+  const json length = document.bytes.size();
+  const auto import_with = [&](const char* name, const char* uri) {
+    write(name, document.bytes);
+    Document external = document;
+    external.root["buffers"] = {{{"byteLength", length}, {"uri", uri}}};
+    external.bytes.clear();
+    return import(external);
+  };
+  EXPECT_TRUE(has_note(import_with("sub/a.bin", "sub\\a.bin"), "read as a path"));
+  EXPECT_TRUE(has_note(import_with("50%25.bin", "50%25.bin"), "read as a path"))
+      << "percent signs not encoded";
+  EXPECT_TRUE(import_with("b c.bin", "b%20c.bin").notes.empty());
+  EXPECT_TRUE(import_with("back\\slash.bin", "back\\slash.bin").notes.empty()) << "such a file may exist";
+}
+
+TEST_F(Gltf, WhatIsNotReadIsNotedOnce) {
+  Document document = triangle();
+  json& attributes = document.root["meshes"][0]["primitives"][0]["attributes"];
+  attributes["_HEAT"] = attributes["COLOR_1"] = attributes["POSITION"];
+  document.root["meshes"][0]["primitives"].push_back({{"attributes", attributes}});
+  document.root["extensionsUsed"] = {"KHR_lights_punctual", "KHR_texture_transform"};
+  document.root["animations"] = {json::object()};
+  const Mesh mesh = import(document);
+  EXPECT_EQ(mesh.notes.size(), 4u);
+  for (const char* part : {"_HEAT", "COLOR_1", "KHR_lights_punctual", "animations"})
+    EXPECT_TRUE(has_note(mesh, part)) << part;
+  EXPECT_TRUE(import(triangle()).notes.empty());
 }
 
 TEST_F(Gltf, IndicesOfEveryWidthAndNone) {
@@ -558,14 +522,17 @@ TEST_F(Gltf, TheHashCoversFilesAndExternalBuffersInOrder) {
   const std::string data = "data:application/octet-stream;base64," + base64(document.bytes);
   write("one.bin", "first");
   write("two.bin", "second");
-  document.root["buffers"] = {{{"byteLength", 5}, {"uri", "one.bin"}},
-                              {{"byteLength", 36}, {"uri", data}},
+  document.root["buffers"] = {{{"byteLength", 36}, {"uri", data}},
+                              {{"byteLength", 5}, {"uri", "one.bin"}},
                               {{"byteLength", 6}, {"uri", "two.bin"}}};
-  const std::string text = document.root.dump();
-  const std::filesystem::path paths[] = {write("a.gltf", text), write("b.stl", "stl bytes")};
-  const std::string all = text + "first" + "second" + "stl bytes";
+  const std::string text = document.root.dump(), off = "OFF 3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+  const std::filesystem::path paths[] = {write("a.gltf", text), write("b.off", off)};
+  const Mesh mesh = lsp::import_meshes(paths, {});
+  ASSERT_EQ(mesh.sources.size(), 2u);
+  EXPECT_EQ(mesh.sources[0], (std::vector{paths[0], folder_ / "one.bin", folder_ / "two.bin"}));
+  const std::string all = text + "first" + "second" + off;
   const XXH128_hash_t want = XXH3_128bits(all.data(), all.size());
-  const auto hash = lsp::hash_inputs(paths);
+  const auto hash = lsp::hash_sources(mesh);
   EXPECT_EQ(hash[0], want.low64);
   EXPECT_EQ(hash[1], want.high64);
 }

@@ -128,7 +128,7 @@ TEST(Scenes, TextFormatsAgreeWithOpenMesh) {
       const auto& face = other.faces[mesh.primitives[t]];
       for (size_t i = 0; i < 3; ++i) {
         const auto vertex = size_t(face[i].idx());
-        const glm::vec3& position = mesh.positions[mesh.triangles[t][int(i)]];
+        const glm::vec3 position(glm::dvec3(mesh.positions[mesh.triangles[t][int(i)]]) + mesh.origin);
         different += vertex >= other.vertices.size() || !same(position, other.vertices[vertex]);
       }
     }

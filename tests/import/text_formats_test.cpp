@@ -2,8 +2,11 @@
 #include "mesh_files.h"
 
 #include <algorithm>
+#include <chrono>
 
 #include "import/polygons.h"
+#include "import/texture.h"
+#include "png_bytes.h"
 
 namespace {
 
@@ -118,6 +121,60 @@ TEST_F(Obj, MaterialsWithSpacesEmissionAndWindowsPaths) {
   EXPECT_TRUE(has_note(mesh, "named but not defined"));
 }
 
+TEST_F(Obj, TexturesWithTheirOptions) {
+  // Upper row red, green; lower row blue, white; half of the mask's alpha is there.
+  write("a picture.png",
+        rgba_png(2, 2, {255, 0, 0, 255, 0, 255, 0, 255, 0, 0, 255, 255, 255, 255, 255, 255}));
+  write("mask.png", rgba_png(2, 1, {0, 0, 0, 255, 0, 0, 0, 0}));
+  write("grey.png", png_bytes<uint8_t>(1, 1, PNG_FORMAT_GRAY, {51}));
+  const auto color_with = [&](const std::string& material, const std::string& uv) {
+    write("a.mtl", "newmtl m\n" + material);
+    return import("a.obj", "mtllib a.mtl\nusemtl m\n" + kSquare + uv + "f 1/1 2/2 3/3\nf 1/1 3/3 4/4\n");
+  };
+  // In the middle of the lower left texel of four.
+  const std::string lower_left = "vt 0.2 0.2\nvt 0.3 0.2\nvt 0.3 0.3\nvt 0.2 0.3\n",
+                    all = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
+  const std::string in_other = "map_Kd -o 0.5 0.5 0 -s 1 1 1 a picture.png\n";
+  EXPECT_NEAR(color_with("map_Kd a picture.png\n", lower_left).color(0).base_color.b, 1.0f, 0.1f);
+  EXPECT_LT(color_with("map_Kd a picture.png\n", lower_left).color(0).base_color.r, 0.1f);
+  EXPECT_NEAR(color_with(in_other, lower_left).color(0).base_color.g, 1.0f, 0.1f);
+  const Mesh scaled = color_with("Kd 0.5 1 1\nmap_Kd -s 0.5 0.5 C:\\art\\a picture.png\n", all);
+  EXPECT_GT(scaled.color(0).base_color.b, 0.7f) << "the lower left quarter, and what blends into it";
+  EXPECT_EQ(scaled.sources[0].size(), 3u);
+  const Mesh masked = color_with("d 0.5\nmap_Kd a picture.png\nmap_d mask.png\n", all);
+  EXPECT_NEAR(masked.color(0).coverage + masked.color(1).coverage, 0.5f, 1e-4f);
+  EXPECT_NEAR(masked.color(0).base_color.g, 0.0f, 1e-4f) << "what is masked has no colour";
+  EXPECT_NEAR(color_with("map_d grey.png\n", all).color(0).coverage, 0.2f, 1e-4f) << "grey is what is solid";
+  EXPECT_NEAR(color_with("map_d -imfchan r a picture.png\n", all).color(0).coverage, 0.5f, 0.3f);
+  EXPECT_NEAR(color_with("map_Ke a picture.png\nKe 4 4 4\n", lower_left).color(0).emission.b, 4.0f, 0.4f);
+  const Mesh noted = color_with("map_Bump -bm 2 x.png\nmap_Kd -mm 0 2 gone.png\n", all);
+  for (const char* part : {"map_Bump", "-mm", "gone.png"}) EXPECT_TRUE(has_note(noted, part)) << part;
+}
+
+TEST_F(Obj, OpacityInEitherForm) {
+  const auto opacity = [&](const std::string& lines) {
+    write("a.mtl", "newmtl m\n" + lines);
+    const Mesh mesh = import("a.obj", "mtllib a.mtl\n" + kSquare + "f 1 2 3\nusemtl m\nf 1 2 3\n");
+    return mesh.triangles.size() == 2 ? mesh.color(1).coverage : 0;
+  };
+  EXPECT_FLOAT_EQ(opacity("d 0.25\n"), 0.25f);
+  EXPECT_FLOAT_EQ(opacity("Tr 0.25\n"), 0.75f);
+  EXPECT_FLOAT_EQ(opacity("Tr 1\nd 1\n"), 1.0f) << "d wins";
+  EXPECT_FLOAT_EQ(opacity("d 1\nTr 1\n"), 1.0f) << "in either order";
+  EXPECT_EQ(opacity("d 0\n"), 0.0f) << "left out";
+}
+
+TEST_F(Obj, VertexColours) {
+  const std::string faces = "f 1 2 3\n";
+  const Mesh mesh = import("a.obj", "v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 0 0.7372549 0\n" + faces);
+  EXPECT_NEAR(mesh.color(0).base_color.r, 2 / 3.0f, 1e-5f);
+  EXPECT_NEAR(mesh.color(0).base_color.g, lsp::linear_of_srgb(0.7372549) / 3, 1e-5);
+  EXPECT_NEAR(
+      import("a.obj", "v 0 0 0 255 0 0\nv 1 0 0 255 0 0\nv 0 1 0 255 0 0\n" + faces).color(0).base_color.r, 1,
+      1e-5f);
+  EXPECT_TRUE(import("a.obj", "v 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\n" + faces).colors.empty()) << "a weight";
+}
+
 TEST_F(Obj, AMissingLibraryIsANote) {
   EXPECT_TRUE(
       has_note(import("a.obj", "mtllib none.mtl\n" + kSquare + "f 1 2 3\n"), "none.mtl is not there"));
@@ -134,9 +191,9 @@ TEST_F(Obj, ConcavePolygonsAreCutInsideTheirOutline) {
 
 TEST(Triangulate, CombsInEveryPlaneKeepTheirArea) {
   for (int axis = 0; axis < 3; ++axis) {
-    std::vector<glm::vec3> comb;
-    const auto add = [&](float u, float v) {
-      glm::vec3 p(0.25f);
+    std::vector<glm::dvec3> comb;
+    const auto add = [&](double u, double v) {
+      glm::dvec3 p(0.25);
       p[(axis + 1) % 3] = u;
       p[(axis + 2) % 3] = v;
       comb.push_back(p);
@@ -154,11 +211,11 @@ TEST(Triangulate, CombsInEveryPlaneKeepTheirArea) {
     EXPECT_EQ(cut.size(), comb.size() - 2);
     double sum = 0;
     for (const glm::uvec3& t : cut) {
-      sum += 0.5 * double(glm::cross(comb[t.y] - comb[t.x], comb[t.z] - comb[t.x])[axis]);
+      sum += 0.5 * glm::cross(comb[t.y] - comb[t.x], comb[t.z] - comb[t.x])[axis];
     }
     double outline = 0;  // the shoelace formula
     for (size_t i = 0; i < comb.size(); ++i) {
-      const glm::vec3 a = comb[i], b = comb[(i + 1) % comb.size()];
+      const glm::dvec3 a = comb[i], b = comb[(i + 1) % comb.size()];
       outline += 0.5 * double(glm::cross(a, b)[axis]);
     }
     EXPECT_NEAR(sum, outline, 1e-3);
@@ -170,12 +227,121 @@ TEST(Triangulate, CombsInEveryPlaneKeepTheirArea) {
   }
 }
 
+using Outline = std::vector<glm::dvec2>;
+
+double shoelace(const Outline& outline) {
+  double sum = 0;
+  for (size_t i = 0; i < outline.size(); ++i) {
+    const glm::dvec2 a = outline[i], b = outline[(i + 1) % outline.size()];
+    sum += 0.5 * (a.x * b.y - a.y * b.x);
+  }
+  return sum;
+}
+
+// Cuts the outline, either way round, and compares areas: the triangles' as they are turned, and their sizes.
+void expect_filled(const Outline& outline, const char* what) {
+  for (const bool backwards : {false, true}) {
+    std::vector<glm::dvec3> corners;
+    for (const glm::dvec2& p : outline) corners.push_back({0.25, p});
+    if (backwards) std::reverse(corners.begin(), corners.end());
+    std::vector<glm::uvec3> cut;
+    uint64_t work = 1'000'000'000;
+    EXPECT_EQ(lsp::triangulate(corners, cut, work), lsp::EarCut::kRight) << what;
+    ASSERT_EQ(cut.size(), corners.size() - 2) << what;
+    double sum = 0, sizes = 0;
+    for (const glm::uvec3& t : cut) {
+      const double area = 0.5 * glm::cross(corners[t.y] - corners[t.x], corners[t.z] - corners[t.x]).x;
+      sum += area;
+      sizes += std::abs(area);
+    }
+    const double want = std::abs(shoelace(outline));
+    EXPECT_NEAR(std::abs(sum), want, 1e-9 * want) << what;
+    EXPECT_NEAR(sizes, want, 1e-9 * want) << what << ": a triangle lies outside or twice";
+  }
+}
+
+// Zigzags around circles, spirals, combs: n corners of which half are in the others' way.
+Outline star(size_t n) {
+  Outline outline;
+  for (size_t i = 0; i < n; ++i) {
+    const double angle = 2 * 3.14159265358979 * double(i) / double(n),
+                 radius = i % 2 ? 1 : 0.3 + 0.6 * double(i % 7) / 7;
+    outline.push_back({radius * std::cos(angle), radius * std::sin(angle)});
+  }
+  return outline;
+}
+
+Outline spiral(size_t n) {
+  Outline outline;
+  for (size_t i = 0; i < n; ++i) {
+    const bool inner = i >= n / 2;
+    const double turn = 40.0 * double(inner ? n - 1 - i : i) / double(n);
+    const double radius = 1 + turn + (inner ? 0.4 * 6.28 : 0);
+    outline.push_back({radius * std::cos(turn), radius * std::sin(turn)});
+  }
+  return outline;
+}
+
+TEST(Triangulate, ManyCornersInAMoment) {
+  for (const auto& [outline, name] : {std::pair{star(15'000), "star"}, std::pair{spiral(15'000), "spiral"},
+                                      std::pair{star(100'000), "large star"}}) {
+    const auto start = std::chrono::steady_clock::now();
+    expect_filled(outline, name);
+    EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(10)) << name;
+  }
+}
+
+TEST(Triangulate, OutlinesThatTouchThemselves) {
+  const Outline touching_squares = {{0, 0}, {1, 0}, {1, 1}, {0, 1}, {0, 0}, {-1, 0}, {-1, -1}, {0, -1}};
+  expect_filled(touching_squares, "two squares that share a corner");
+  const Outline bridged = {{0, 0}, {4, 0}, {4, 4}, {0, 4}, {0, 0}, {1, 1}, {1, 3}, {3, 3}, {3, 1}, {1, 1}};
+  expect_filled(bridged, "a square with a square hole, over a bridge");
+  const Outline hole_at_corner = {{0, 0}, {4, 0}, {4, 4}, {0, 4}, {0, 0}, {1, 2}, {2, 1}};
+  expect_filled(hole_at_corner, "a hole that touches a corner");
+  const Outline hole_at_edge = {{0, 0}, {2, 0}, {1, 1}, {3, 1}, {2, 0}, {4, 0}, {4, 4}, {0, 4}};
+  expect_filled(hole_at_edge, "a hole that hangs on an edge");
+  const Outline corner_on_edge = {{0, 0}, {4, 0}, {4, 4}, {2, 0}, {0, 4}};
+  expect_filled(corner_on_edge, "a corner that touches the opposite edge");
+  const Outline runs = {{0, 0}, {1, 0}, {2, 0}, {3, 0}, {3, 1}, {3, 2},
+                        {2, 2}, {2, 1}, {1, 1}, {1, 2}, {0, 2}, {0, 1}};
+  expect_filled(runs, "runs of corners on a line");
+  const Outline repeated = {{0, 0}, {0, 0}, {4, 0}, {4, 4}, {4, 4}, {2, 1}, {0, 4}, {0, 4}};
+  expect_filled(repeated, "corners twice");
+  const Outline hair = {{0, 0}, {2, 0}, {2, -3}, {2, 0}, {4, 0}, {4, 4}, {2, 1}, {0, 4}};
+  expect_filled(hair, "a line there and back");
+}
+
+// Rows of square holes in one outline, each over a bridge from the left.
+TEST(Triangulate, ManyHoles) {
+  Outline outline = {{0, 0}, {40, 0}, {40, 40}, {0, 40}};
+  for (double y = 39; y > 0; y -= 2) {
+    outline.push_back({0, y});
+    for (double x = 1; x < 39; x += 2) {
+      outline.push_back({x, y});
+      outline.insert(outline.end(), {{x + 0.5, y + 0.5}, {x + 1, y}});
+    }
+    for (double x = 37; x > 0; x -= 2)
+      outline.insert(outline.end(), {{x + 1, y}, {x + 0.5, y - 0.5}, {x, y}});
+    outline.push_back({0, y});
+  }
+  expect_filled(outline, "holes");
+}
+
+TEST(Triangulate, CrossedOutlinesAreSaidToBe) {
+  std::vector<glm::dvec3> corners;
+  for (const glm::dvec2& p : Outline{{0, 0}, {4, 0}, {0, 3}, {4, 4}, {0, 1}}) corners.push_back({p, 0});
+  std::vector<glm::uvec3> cut;
+  uint64_t work = 1'000'000;
+  EXPECT_EQ(lsp::triangulate(corners, cut, work), lsp::EarCut::kCrossed);
+  EXPECT_EQ(cut.size(), corners.size() - 2);
+}
+
 TEST(Triangulate, AlwaysGivesCornersMinusTwoAndEnds) {
   uint32_t seed = 1;
   const auto random = [&] { return float((seed = seed * 1664525u + 1013904223u) >> 8) * 0x1p-24f; };
   for (size_t n = 3; n < 200; ++n) {
-    std::vector<glm::vec3> tangle(n);
-    for (glm::vec3& p : tangle)
+    std::vector<glm::dvec3> tangle(n);
+    for (glm::dvec3& p : tangle)
       p = {std::floor(random() * 4), std::floor(random() * 4), n % 3 ? 0.0f : random()};
     std::vector<glm::uvec3> cut;
     uint64_t work = n % 5 ? 1'000'000 : 500;
@@ -212,6 +378,58 @@ TEST_F(AnyFormat, EqualPositionsAreWeldedExactly) {
   EXPECT_EQ(mesh.positions.size(), 5u) << "0, x, y, -x and the smallest number that is not 0";
   EXPECT_EQ(mesh.triangles[0].x, mesh.triangles[1].x);
   EXPECT_FALSE(std::signbit(mesh.positions[mesh.triangles[1].x].x));
+}
+
+// A thousand small triangles far away: every one is kept, and where it was.
+TEST_F(AnyFormat, FarFromTheOriginTheMeshHasOneOfItsOwn) {
+  std::string obj, ply =
+                       "ply\nformat ascii 1.0\nelement vertex 3000\nproperty double x\nproperty double "
+                       "y\nproperty double z\n"
+                       "element face 1000\nproperty list uchar int vertex_indices\nend_header\n";
+  std::vector<glm::dvec3> exact;
+  std::string faces, off = "OFF 3000 1000 0\n", stl = "solid a\n", indices;
+  for (int i = 0; i < 1000; ++i) {
+    const double x = 471234.5625 + 0.01 * i, y = 5412345.125;
+    char line[200];
+    stl += "facet normal 0 0 1\nouter loop\n";
+    for (const glm::dvec3& p :
+         {glm::dvec3(x, y, 0), glm::dvec3(x + 0.01, y, 0), glm::dvec3(x, y + 0.01, 0.5)}) {
+      exact.push_back(p);
+      std::snprintf(line, sizeof line, "%.17g %.17g %.17g\n", p.x, p.y, p.z);
+      obj += std::string("v ") + line;
+      ply += line;
+      off += line;
+      stl += std::string("vertex ") + line;
+    }
+    stl += "endloop\nendfacet\n";
+    faces += "f -3 -2 -1\n";
+    obj += "f -3 -2 -1\n";
+    indices += "3 " + std::to_string(3 * i) + " " + std::to_string(3 * i + 1) + " " +
+               std::to_string(3 * i + 2) + "\n";
+  }
+  for (const auto& [name, text] : {std::pair<std::string, std::string>{"a.obj", obj},
+                                   {"a.ply", ply + indices},
+                                   {"a.off", off + indices},
+                                   {"a.stl", stl + "endsolid\n"}}) {
+    const Mesh mesh = import(name, text);
+    ASSERT_EQ(mesh.triangles.size(), 1000u) << name;
+    EXPECT_EQ(mesh.rejected.total(), 0u);
+    EXPECT_NE(mesh.origin, glm::dvec3(0));
+    EXPECT_TRUE(mesh.notes.empty()) << "nothing is lost";
+    for (size_t k = 0; k < 3000; ++k) {
+      const glm::dvec3 p = mesh.origin + glm::dvec3(corner(mesh, k / 3, int(k % 3)));
+      ASSERT_LT(glm::length(p - exact[k]), 1e-6 * 10) << name << k;
+    }
+  }
+}
+
+TEST_F(AnyFormat, AnOriginOnlyWhereItIsNeeded) {
+  const auto triangle_at = [&](const std::string& x, const std::string& x1) {
+    return import("a.obj", "v " + x + " 0 0\nv " + x1 + " 0 0\nv " + x + " 1 0\nf 1 2 3\n");
+  };
+  EXPECT_EQ(triangle_at("10.1", "11.1").origin, glm::dvec3(0)) << "moved by less than 1e-6 of its size";
+  EXPECT_EQ(triangle_at("1048576", "1048577").origin, glm::dvec3(0)) << "whole in single precision";
+  EXPECT_NE(triangle_at("1000.1", "1001.1").origin, glm::dvec3(0));
 }
 
 TEST_F(AnyFormat, InputsAreNumberedInTheOrderGiven) {
@@ -303,7 +521,7 @@ TEST_F(Ply, AllEncodingsGiveTheSameMesh) {
     EXPECT_EQ(mesh.positions.size(), 4u);
     EXPECT_NEAR(area(mesh), 1.5, 1e-6);
     EXPECT_EQ(corner(mesh, 0, 2), glm::vec3(1, 1, 3));
-    EXPECT_TRUE(has_note(mesh, "colours"));
+    EXPECT_TRUE(mesh.colors.empty()) << "red alone is no colour";
   }
 }
 
@@ -318,6 +536,38 @@ TEST_F(Ply, NormalsAndStrips) {
   for (size_t t = 0; t < 3; ++t) EXPECT_GT(face_normal(mesh, t).z, 0.99f);
   EXPECT_EQ(mesh.normals[0][0], glm::vec3(0, 0, 1));
   EXPECT_EQ(mesh.normals[2][1], glm::vec3(0, 1, 0));
+}
+
+TEST_F(Ply, ColoursOfVerticesAndFaces) {
+  const auto colored = [&](const std::string& type, const std::string& a, const std::string& b) {
+    const std::string rgb =
+        "property " + type + " red\nproperty " + type + " green\nproperty " + type + " blue\n";
+    return import(
+        "a.ply",
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n" +
+            rgb + "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 " + a +
+            "\n1 0 0 " + b + "\n0 1 0 " + b + "\n3 0 1 2\n");
+  };
+  for (const Mesh& mesh :
+       {colored("uchar", "255 0 188", "0 0 188"), colored("float", "1 0 0.7372549", "0 0 0.7372549"),
+        colored("ushort", "65535 0 48316", "0 0 48316")}) {
+    EXPECT_NEAR(mesh.color(0).base_color.r, 1 / 3.0f, 1e-5f);
+    EXPECT_EQ(mesh.color(0).base_color.g, 0.0f);
+    EXPECT_NEAR(mesh.color(0).base_color.b, lsp::linear_of_srgb(188 / 255.0), 1e-5);
+    EXPECT_TRUE(mesh.notes.empty());
+  }
+  const Mesh faces = import("a.ply",
+                            "ply\nformat ascii 1.0\ncomment TextureFile a.png\nelement vertex 3\nproperty "
+                            "float x\nproperty float y\nproperty float z\n"
+                            "element face 3\nproperty list uchar int vertex_indices\nproperty uchar "
+                            "red\nproperty uchar green\nproperty uchar blue\n"
+                            "property uchar alpha\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 255 0 0 255\n2 0 "
+                            "1 1 2 3 255\n3 0 1 2 0 0 255 9\n");
+  ASSERT_EQ(faces.triangles.size(), 2u);
+  EXPECT_EQ(faces.color(0).base_color, glm::vec3(1, 0, 0));
+  EXPECT_EQ(faces.color(1).base_color, glm::vec3(0, 0, 1));
+  EXPECT_TRUE(has_note(faces, "a.png"));
+  EXPECT_TRUE(has_note(faces, "alpha"));
 }
 
 TEST_F(Ply, HeadersThatPromiseTooMuchAreRefusedAtOnce) {
@@ -359,10 +609,24 @@ TEST_F(Stl, BinaryEvenWhereItsHeaderSaysSolid) {
   ASSERT_EQ(mesh.triangles.size(), 3u);
   EXPECT_EQ(corner(mesh, 2, 1), glm::vec3(1, 0, 2));
   EXPECT_EQ(mesh.normals[0][0], glm::vec3(0, 0, 1));
-  EXPECT_TRUE(has_note(import("b.stl", binary_stl("", 2, 3)), "after the last triangle"));
-  EXPECT_EQ(refusal("c.stl", binary_stl("", 4, 3)).exit, Exit::kInvalid);
-  EXPECT_EQ(refusal("c.stl", binary_stl("", 0xFFFFFFFF, 3)).exit, Exit::kInvalid);
+  EXPECT_EQ(refusal("c.stl", binary_stl("", 4, 3) + "x").exit, Exit::kInvalid) << "cut short";
   EXPECT_EQ(refusal("c.stl", "short").exit, Exit::kInvalid);
+}
+
+TEST_F(Stl, WrongCountsOverWholeTriangles) {
+  for (const char* header : {"", "solid streamed\nfacet", "SOLID x\n"}) {
+    for (const uint32_t declared : {0u, 2u, 4u, 0xFFFFFFFFu}) {
+      const Mesh mesh = import("a.stl", binary_stl(header, declared, 3));
+      EXPECT_EQ(mesh.triangles.size(), 3u) << header << declared;
+      EXPECT_TRUE(has_note(mesh, "and holds 3"));
+    }
+    EXPECT_TRUE(import("a.stl", binary_stl(header, 3, 3)).notes.empty());
+    EXPECT_EQ(import("a.stl", binary_stl(header, 0, 3) + "xyz").triangles.size(), 3u);
+    const Mesh tail = import("a.stl", binary_stl(header, 3, 3) + std::string(100, '\0'));
+    EXPECT_EQ(tail.primitive_count, 3u) << "zeros are no triangles";
+    EXPECT_TRUE(has_note(tail, "after the last triangle"));
+  }
+  EXPECT_EQ(refusal("a.stl", binary_stl("", 0, 0)).exit, Exit::kInvalid);
 }
 
 TEST_F(Stl, TextWithSeveralSolidsInAnyCase) {
@@ -387,10 +651,24 @@ TEST_F(Off, CommentsColoursBrokenLinesAndKeywords) {
     const Mesh mesh = import("a.off", start + body);
     EXPECT_EQ(mesh.triangles.size(), 4u) << start;
     EXPECT_NEAR(area(mesh), 2.0, 1e-6);
-    EXPECT_TRUE(has_note(mesh, "colours"));
+    EXPECT_EQ(mesh.color(2).base_color, glm::vec3(lsp::linear_of_srgb(0.5), 0, 0)) << start;
   }
   const Mesh with_normals = import("a.off", "NOFF\n3 1 0\n0 0 0 0 0 1\n1 0 0 0 1 0\n0 1 0 0 0 1\n3 0 1 2\n");
   EXPECT_EQ(with_normals.normals[0][1], glm::vec3(0, 1, 0));
+}
+
+TEST_F(Off, ColoursOfVerticesAndFaces) {
+  const Mesh mesh =
+      import("a.off",
+             "COFF\n4 2 0\n0 0 0 255 0 0 255\n1 0 0 255 0 0 255\n1 1 0 255 0 0 255\n0 1 0 0 255 0 128\n"
+             "3 0 1 2\n3 0 2 3\n");
+  EXPECT_EQ(mesh.color(0).base_color, glm::vec3(1, 0, 0));
+  EXPECT_NEAR(mesh.color(1).base_color.g, 1 / 3.0f, 1e-5f);
+  EXPECT_TRUE(has_note(mesh, "alpha"));
+  const Mesh faces =
+      import("a.off", "OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2 0 128 255\n3 0 2 3 7\n");
+  EXPECT_NEAR(faces.color(0).base_color.g, lsp::linear_of_srgb(128 / 255.0), 1e-6);
+  EXPECT_TRUE(has_note(faces, "by number"));
 }
 
 TEST_F(Off, Refusals) {

@@ -161,7 +161,8 @@ Bytes GltfAccessors::decode_meshopt(int buffer_view, const tinygltf::Value& exte
 std::vector<float> GltfAccessors::floats(int index, int components) {
   const tinygltf::Accessor& accessor = at(index);
   const size_t component = size_of(accessor.componentType);
-  if (accessor.type != components || component == 0 ||
+  const int shape = components == 16 ? TINYGLTF_TYPE_MAT4 : components;
+  if (accessor.type != shape || component == 0 ||
       accessor.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT) {
     fail(document_, "has a vertex attribute of a type glTF does not permit for it");
   }

@@ -20,9 +20,12 @@ using Bytes = std::span<const uint8_t>;
 
 struct GltfDocument {
   std::string file;
-  tinygltf::Model model;       // without images, textures, animations, skins, cameras, extras; no buffer data
-  std::vector<Bytes> buffers;  // by glTF index; empty where the file gives no bytes for it
+  tinygltf::Model model;             // without materials, animations, cameras, extras; no buffer data
+  nlohmann::json looks;              // materials, textures, images and samplers as they are, nothing checked
+  std::vector<Bytes> buffers;        // by glTF index; empty where the file gives no bytes for it
   std::vector<std::string> storage;  // what `buffers` points into
+  std::vector<std::filesystem::path> sources;  // files beside it that were read
+  std::vector<std::string> notes;              // what is not read, or read although it is wrong
 };
 
 // Reads and checks a .gltf or .glb file with its external buffers and data URIs.
@@ -31,8 +34,5 @@ struct GltfDocument {
 // Throws Failure: kFile, kInvalid, kUnsupported (version, or a required extension that changes geometry and
 // is not known, by name), kLimit.
 std::unique_ptr<GltfDocument> read_gltf_document(const std::filesystem::path& path, Budget& budget);
-
-// The files named by a .gltf file's buffers, in buffer order. For the hash of the sources.
-std::vector<std::filesystem::path> external_buffers(const std::filesystem::path& path, Budget& budget);
 
 }  // namespace lsp

@@ -27,10 +27,11 @@ namespace {
 // Processor time for all primitives of a file: ten times what a hundred million triangles take.
 constexpr rlim_t kSeconds = 120;
 
-// On the pipe, for each primitive: Exit::kDone and three vectors, or another exit code and a text.
+// On the pipe, for each primitive: Exit::kDone and its arrays, or another exit code and a text. An array is
+// its number of elements and these.
 struct Answer {
   uint64_t exit = 0;
-  uint64_t sizes[3] = {};
+  uint64_t reason_bytes = 0;
 };
 
 bool write_all(int fd, const void* data, size_t size) {
@@ -88,9 +89,6 @@ void limit(int resource, rlim_t value) {
     DracoMesh mesh;
     try {
       mesh = decode_draco(file, job, budget);
-      answer.sizes[0] = mesh.indices.size();
-      answer.sizes[1] = mesh.positions.size();
-      answer.sizes[2] = mesh.normals.size();
     } catch (const Failure& failure) {
       answer.exit = uint64_t(failure.exit());
       reason = failure.what();
@@ -102,35 +100,44 @@ void limit(int resource, rlim_t value) {
       answer.exit = uint64_t(Exit::kInvalid);
       reason = "has KHR_draco_mesh_compression data that cannot be decoded, export it again";
     }
-    if (answer.exit) answer.sizes[0] = reason.size();
-    bool good = write_all(fd, &answer, sizeof answer);
-    good = good &&
-           (answer.exit ? write_all(fd, reason.data(), reason.size())
-                        : write_all(fd, mesh.indices.data(), mesh.indices.size() * sizeof(uint32_t)) &&
-                              write_all(fd, mesh.positions.data(), mesh.positions.size() * sizeof(float)) &&
-                              write_all(fd, mesh.normals.data(), mesh.normals.size() * sizeof(float)));
+    answer.reason_bytes = answer.exit ? reason.size() : 0;
+    bool good = write_all(fd, &answer, sizeof answer) && write_all(fd, reason.data(), answer.reason_bytes);
+    const auto send = [&](const auto& vector) {
+      const uint64_t size = vector.size();
+      good =
+          good && write_all(fd, &size, sizeof size) && write_all(fd, vector.data(), size * sizeof vector[0]);
+    };
+    if (!answer.exit) {
+      send(mesh.indices);
+      for (const auto& values : mesh.values) send(values);
+    }
     if (!good || answer.exit) break;
   }
   _exit(0);
 }
 
 // One answer of the child, which hostile bytes may have made say anything. False where it said nothing more.
-bool receive(int fd, const std::string& file, Budget& budget, DracoMesh& mesh) {
+bool receive(int fd, const std::string& file, const DracoJob& job, Budget& budget, DracoMesh& mesh) {
   Answer answer;
   if (!read_all(fd, &answer, sizeof answer)) return false;
   if (answer.exit) {
-    std::string reason(std::min<uint64_t>(answer.sizes[0], 4096), '\0');
+    std::string reason(std::min<uint64_t>(answer.reason_bytes, 4096), '\0');
     if (!read_all(fd, reason.data(), reason.size())) return false;
     const bool known = answer.exit == uint64_t(Exit::kLimit) || answer.exit == uint64_t(Exit::kUnsupported);
     throw Failure(known ? Exit(int(answer.exit)) : Exit::kInvalid, file, printable(reason));
   }
-  const auto fill = [&](auto& vector, uint64_t size) {
+  const auto fill = [&](auto& vector, uint64_t components) {
+    uint64_t size = 0;
+    if (!read_all(fd, &size, sizeof size) || size % components != 0) return false;
     budget.charge(file, size, sizeof vector[0]);
-    vector.resize(size / 3 * 3);
-    return size % 3 == 0 && read_all(fd, vector.data(), size * sizeof vector[0]);
+    vector.resize(size);
+    return read_all(fd, vector.data(), size * sizeof vector[0]);
   };
-  return fill(mesh.indices, answer.sizes[0]) && fill(mesh.positions, answer.sizes[1]) &&
-         fill(mesh.normals, answer.sizes[2]);
+  if (!fill(mesh.indices, 3)) return false;
+  for (const DracoAttribute& attribute : job.attributes) {
+    if (!fill(mesh.values.emplace_back(), uint64_t(attribute.components))) return false;
+  }
+  return true;
 }
 
 }  // namespace
@@ -168,8 +175,8 @@ std::vector<DracoMesh> decode_draco_fenced(const std::string& file, std::span<co
   if (child < 0) throw Failure(Exit::kLimit, file, "needs a process of its own to decode, and there is none");
 
   std::vector<DracoMesh> meshes(jobs.size());
-  for (DracoMesh& mesh : meshes) {
-    if (receive(process.fd, file, budget, mesh)) continue;
+  for (size_t i = 0; i < jobs.size(); ++i) {
+    if (receive(process.fd, file, jobs[i], budget, meshes[i])) continue;
     process.collect();
     const bool slow = WIFSIGNALED(process.status) &&
                       (WTERMSIG(process.status) == SIGXCPU || WTERMSIG(process.status) == SIGKILL);

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <memory>
 
-#include "import/gltf_document.h"
 #include "import/readers.h"
 #include "import/source_file.h"
 #include "lsp/program.h"
@@ -38,6 +37,7 @@ Mesh import_meshes(std::span<const std::filesystem::path> inputs, const ImportOp
   Budget budget(options.memory_limit);
   MeshBuilder builder(budget, options.crease_angle_degrees);
   for (const std::filesystem::path& path : inputs) {
+    builder.begin_input(path);
     const uint64_t count_before = builder.mesh().primitive_count;
     const Rejected before = builder.mesh().rejected;
     try {
@@ -56,28 +56,25 @@ Mesh import_meshes(std::span<const std::filesystem::path> inputs, const ImportOp
                               std::to_string(rejected.degenerate - before.degenerate) + " degenerate, " +
                               std::to_string(rejected.non_finite - before.non_finite) + " not finite, " +
                               std::to_string(rejected.out_of_range - before.out_of_range) +
-                              " with indices out of range)";
+                              " with indices out of range, " +
+                              std::to_string(rejected.invisible - before.invisible) + " wholly transparent)";
       throw Failure(Exit::kInvalid, path.string(), why + ", repair or leave out the file");
     }
   }
   return builder.take();
 }
 
-std::array<uint64_t, 2> hash_inputs(std::span<const std::filesystem::path> inputs) {
+std::array<uint64_t, 2> hash_sources(const Mesh& mesh) {
   const std::unique_ptr<XXH3_state_t, XXH_errorcode (*)(XXH3_state_t*)> state(XXH3_createState(),
                                                                               XXH3_freeState);
   if (!state) throw std::bad_alloc();
   XXH3_128bits_reset(state.get());
-  const auto add = [&](const std::filesystem::path& path) {
-    Budget budget(0);
-    const std::string bytes = read_file(path, budget);
-    XXH3_128bits_update(state.get(), bytes.data(), bytes.size());
-  };
-  for (const std::filesystem::path& path : inputs) {
-    add(path);
-    if (extension_of(path) != ".gltf") continue;
-    Budget budget(0);
-    for (const std::filesystem::path& buffer : external_buffers(path, budget)) add(buffer);
+  for (const auto& files : mesh.sources) {
+    for (const std::filesystem::path& path : files) {
+      Budget budget(0);
+      const std::string bytes = read_file(path, budget);
+      XXH3_128bits_update(state.get(), bytes.data(), bytes.size());
+    }
   }
   const XXH128_hash_t hash = XXH3_128bits_digest(state.get());
   return {hash.low64, hash.high64};

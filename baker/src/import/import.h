@@ -36,10 +36,8 @@ struct ImportOptions {
 // format, version or required extension, by name), kLimit (memory, or more than 2^32 - 2 triangles).
 Mesh import_meshes(std::span<const std::filesystem::path> inputs, const ImportOptions& options);
 
-// The hash that names a mesh's source: XXH3-128 (seed 0) of the concatenation of the bytes of each input file
-// in the order given and, for a .gltf file, of each external buffer (a `uri` that is not a data URI, resolved
-// beside the file) in buffer order right after it. Returns {low, high} 64 bits.
-// Throws Failure kFile where a file cannot be read, kInvalid where a .gltf file is not JSON.
-std::array<uint64_t, 2> hash_inputs(std::span<const std::filesystem::path> inputs);
+// The hash that names a mesh's source: XXH3-128 (seed 0) of the concatenation of the bytes of all its sources
+// in order. Returns {low, high} 64 bits. Throws Failure kFile where a file cannot be read.
+std::array<uint64_t, 2> hash_sources(const Mesh& mesh);
 
 }  // namespace lsp

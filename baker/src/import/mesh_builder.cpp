@@ -1,12 +1,12 @@
 #include "import/mesh_builder.h"
 
-#include <sys/random.h>
 #include <xxhash.h>
 
-#include <chrono>
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
+#include "import/rounding.h"
 #include "import/source_file.h"
 #include "lsp/program.h"
 
@@ -17,10 +17,10 @@ namespace {
 // time a mesh with a million triangles in one point may take.
 constexpr size_t kMaxSmoothValence = 512;
 
-// A triangle's area below this part of its longest edge squared is no area.
-constexpr double kDegenerateArea = 1e-14;
-
-bool is_finite(const glm::vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+// Whether single precision has room for every component.
+bool is_finite(const glm::dvec3& v) {
+  return std::isfinite(float(v.x)) && std::isfinite(float(v.y)) && std::isfinite(float(v.z));
+}
 
 // Unit vector along `v`, or zero where it has no direction; safe from over- and underflow.
 glm::dvec3 direction_of(const glm::dvec3& v) {
@@ -30,24 +30,11 @@ glm::dvec3 direction_of(const glm::dvec3& v) {
   return scaled / std::sqrt(glm::dot(scaled, scaled));
 }
 
-glm::dvec3 geometric_normal(const glm::vec3& a, const glm::vec3& b, const glm::vec3& c) {
-  return direction_of(glm::cross(glm::dvec3(b) - glm::dvec3(a), glm::dvec3(c) - glm::dvec3(a)));
+glm::dvec3 geometric_normal(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
+  return direction_of(glm::cross(b - a, c - a));
 }
 
-// A key of this process: whoever writes a mesh cannot know which positions collide, and make welding take a
-// time that grows with the square of their number. What is welded does not depend on it.
-uint64_t hash_key() {
-  static const uint64_t key = [] {
-    uint64_t random = 0;
-    if (getrandom(&random, sizeof random, GRND_NONBLOCK) != sizeof random) {
-      random = uint64_t(std::chrono::steady_clock::now().time_since_epoch().count());
-    }
-    return random;
-  }();
-  return key;
-}
-
-uint64_t hash_of(const glm::vec3& p) { return XXH3_64bits_withSeed(&p, sizeof p, hash_key()); }
+uint64_t hash_of(const glm::dvec3& p) { return XXH3_64bits_withSeed(&p, sizeof p, hash_key()); }
 
 }  // namespace
 
@@ -62,20 +49,28 @@ void MeshBuilder::check_count(const std::string& file, uint64_t more) const {
 
 uint64_t MeshBuilder::allocated_bytes() const {
   const auto bytes = [](const auto& vector) { return vector.capacity() * sizeof(vector[0]); };
-  return bytes(mesh_.positions) + bytes(mesh_.triangles) + bytes(mesh_.primitives) + bytes(mesh_.normals) +
-         bytes(mesh_.material_ids) + 2 * bytes(mesh_.materials) + bytes(slots_) + bytes(welded_) +
-         bytes(unsmooth_);
+  return bytes(exact_) + bytes(mesh_.triangles) + bytes(mesh_.primitives) + bytes(mesh_.normals) +
+         bytes(mesh_.material_ids) + bytes(mesh_.colors) + 2 * bytes(mesh_.materials) + bytes(slots_) +
+         bytes(welded_) + bytes(unsmooth_);
 }
 
-void MeshBuilder::begin(const std::string& file, std::span<const glm::vec3> positions,
+void MeshBuilder::add_source(const std::filesystem::path& path) {
+  std::vector<std::filesystem::path>& list = mesh_.sources.back();
+  if (std::find(list.begin(), list.end(), path) != list.end()) return;
+  budget_.charge(path.string(), 256 + path.native().size());
+  list.push_back(path);
+}
+
+void MeshBuilder::begin(const std::string& file, std::span<const glm::dvec3> positions,
                         uint64_t triangle_count, MissingNormals missing) {
   check_count(file, triangle_count);
   // Kept for good: indices, number, normals, material. For a while: the welding, and a vector's old half
   // while it grows.
   constexpr uint64_t kTriangleBytes =
       sizeof(glm::uvec3) + sizeof(uint32_t) + 3 * sizeof(glm::vec3) + sizeof(uint32_t);
-  budget_.charge(file, triangle_count, kTriangleBytes * 3 / 2);
-  budget_.charge(file, positions.size(), sizeof(uint32_t) + sizeof(glm::vec3) * 3 / 2);
+  budget_.charge(file, triangle_count,
+                 (kTriangleBytes + (mesh_.colors.empty() ? 0 : sizeof(TriangleColor))) * 3 / 2);
+  budget_.charge(file, positions.size(), sizeof(uint32_t) + sizeof(glm::dvec3) * 3 / 2);
   file_ = file;
   positions_ = positions;
   missing_ = missing;
@@ -92,26 +87,31 @@ void MeshBuilder::begin(const std::string& file, std::span<const glm::vec3> posi
   reserve(mesh_.primitives);
   reserve(mesh_.normals);
   reserve(mesh_.material_ids);
+  if (!mesh_.colors.empty()) reserve(mesh_.colors);
 }
 
-void MeshBuilder::add(const glm::uvec3& corners, const glm::vec3* normals, uint32_t material) {
+void MeshBuilder::add(const glm::uvec3& corners, const glm::vec3* normals, uint32_t material,
+                      const TriangleColor* color) {
   const auto primitive = uint32_t(mesh_.primitive_count++);
   const size_t count = positions_.size();
   if (corners.x >= count || corners.y >= count || corners.z >= count) {
     ++mesh_.rejected.out_of_range;
     return;
   }
-  const glm::vec3 a = positions_[corners.x], b = positions_[corners.y], c = positions_[corners.z];
+  const glm::dvec3 a = positions_[corners.x], b = positions_[corners.y], c = positions_[corners.z];
   if (!is_finite(a) || !is_finite(b) || !is_finite(c)) {
     ++mesh_.rejected.non_finite;
     return;
   }
-  const glm::dvec3 ab = glm::dvec3(b) - glm::dvec3(a), ac = glm::dvec3(c) - glm::dvec3(a);
-  const glm::dvec3 bc = glm::dvec3(c) - glm::dvec3(b);
-  const glm::dvec3 cross = glm::cross(ab, ac);
-  const double longest = std::max(glm::dot(ab, ab), std::max(glm::dot(ac, ac), glm::dot(bc, bc)));
-  if (a == b || b == c || a == c || 0.5 * std::sqrt(glm::dot(cross, cross)) < kDegenerateArea * longest) {
+  // Not where rounding makes it a triangle: many a mesh has such slivers, and neighbours that meet in them.
+  if (is_degenerate(a, b, c) && is_degenerate(rounded(a), rounded(b), rounded(c))) {
     ++mesh_.rejected.degenerate;
+    return;
+  }
+
+  const TriangleColor own = color ? *color : mesh_.materials[material].color();
+  if (!(own.coverage > 0)) {
+    ++mesh_.rejected.invisible;
     return;
   }
 
@@ -132,11 +132,11 @@ void MeshBuilder::add(const glm::uvec3& corners, const glm::vec3* normals, uint3
       glm::dvec3 direction = is_finite(normals[i]) ? direction_of(glm::dvec3(normals[i])) : glm::dvec3(0);
       if (direction == glm::dvec3(0)) {
         ++unusable_normals_;
-        direction = direction_of(cross);
+        direction = geometric_normal(a, b, c);
       }
       unit[i] = glm::vec3(direction);
     } else if (missing_ == MissingNormals::kFlat) {
-      unit[i] = glm::vec3(direction_of(cross));
+      unit[i] = glm::vec3(geometric_normal(a, b, c));
     } else {
       unit[i] = glm::vec3(std::numeric_limits<float>::quiet_NaN());
       complete = false;
@@ -147,6 +147,19 @@ void MeshBuilder::add(const glm::uvec3& corners, const glm::vec3* normals, uint3
   mesh_.primitives.push_back(primitive);
   mesh_.normals.push_back(unit);
   mesh_.material_ids.push_back(material);
+  if (mesh_.colors.empty()) {
+    if (!color || own == mesh_.materials[material].color()) return;
+    start_colors();
+  }
+  mesh_.colors.push_back(own);
+}
+
+// From the first triangle on that is not as its material says, each has a colour.
+void MeshBuilder::start_colors() {
+  budget_.charge(file_, mesh_.triangles.capacity(), sizeof(TriangleColor));
+  mesh_.colors.reserve(mesh_.triangles.capacity());
+  for (size_t t = 0; t + 1 < mesh_.triangles.size(); ++t)
+    mesh_.colors.push_back(mesh_.materials[mesh_.material_ids[t]].color());
 }
 
 void MeshBuilder::end() {
@@ -159,17 +172,17 @@ void MeshBuilder::end() {
   positions_ = {};
 }
 
-uint32_t MeshBuilder::weld(const glm::vec3& position) {
-  if (2 * (mesh_.positions.size() + 1) > slots_.size()) grow_slots();
-  const glm::vec3 p = position + 0.0f;  // -0 becomes +0
+uint32_t MeshBuilder::weld(const glm::dvec3& position) {
+  if (2 * (exact_.size() + 1) > slots_.size()) grow_slots();
+  const glm::dvec3 p = position + 0.0;  // -0 becomes +0
   const size_t mask = slots_.size() - 1;
   for (size_t slot = hash_of(p) & mask;; slot = (slot + 1) & mask) {
     if (slots_[slot] == kNoIndex) {
-      slots_[slot] = uint32_t(mesh_.positions.size());
-      mesh_.positions.push_back(p);
+      slots_[slot] = uint32_t(exact_.size());
+      exact_.push_back(p);
       return slots_[slot];
     }
-    if (mesh_.positions[slots_[slot]] == p) return slots_[slot];
+    if (exact_[slots_[slot]] == p) return slots_[slot];
   }
 }
 
@@ -178,8 +191,8 @@ void MeshBuilder::grow_slots() {
   budget_.charge(file_, size, sizeof(uint32_t));
   budget_.release(slots_.size() * sizeof(uint32_t));
   slots_.assign(size, kNoIndex);
-  for (uint32_t i = 0; i < mesh_.positions.size(); ++i) {
-    size_t slot = hash_of(mesh_.positions[i]) & (size - 1);
+  for (uint32_t i = 0; i < exact_.size(); ++i) {
+    size_t slot = hash_of(exact_[i]) & (size - 1);
     while (slots_[slot] != kNoIndex) slot = (slot + 1) & (size - 1);
     slots_[slot] = i;
   }
@@ -194,11 +207,11 @@ void MeshBuilder::smooth_missing() {
   };
   const size_t first = group_begin_, count = mesh_.triangles.size() - first;
   const uint64_t temporary =
-      count * 3 * (sizeof(Corner) + sizeof(uint32_t)) + (mesh_.positions.size() + 1) * sizeof(uint32_t);
+      count * 3 * (sizeof(Corner) + sizeof(uint32_t)) + (exact_.size() + 1) * sizeof(uint32_t);
   budget_.charge(file_, temporary);
 
   // Corners sorted by position: those of position p are by_position[begins[p] .. begins[p + 1]).
-  std::vector<uint32_t> begins(mesh_.positions.size() + 1, 0);
+  std::vector<uint32_t> begins(exact_.size() + 1, 0);
   for (size_t t = first; t < first + count; ++t) {
     for (int i = 0; i < 3; ++i) ++begins[mesh_.triangles[t][i] + 1];
   }
@@ -209,12 +222,11 @@ void MeshBuilder::smooth_missing() {
     std::vector<uint32_t> next(begins.begin(), begins.end() - 1);
     for (size_t t = 0; t < count; ++t) {
       const glm::uvec3& triangle = mesh_.triangles[first + t];
-      const glm::vec3 p[3] = {mesh_.positions[triangle.x], mesh_.positions[triangle.y],
-                              mesh_.positions[triangle.z]};
+      const glm::dvec3 p[3] = {exact_[triangle.x], exact_[triangle.y], exact_[triangle.z]};
       const glm::vec3 normal(geometric_normal(p[0], p[1], p[2]));
       for (int i = 0; i < 3; ++i) {
-        const glm::dvec3 u = direction_of(glm::dvec3(p[(i + 1) % 3]) - glm::dvec3(p[i]));
-        const glm::dvec3 v = direction_of(glm::dvec3(p[(i + 2) % 3]) - glm::dvec3(p[i]));
+        const glm::dvec3 u = direction_of(p[(i + 1) % 3] - p[i]);
+        const glm::dvec3 v = direction_of(p[(i + 2) % 3] - p[i]);
         const double sine = std::sqrt(glm::dot(glm::cross(u, v), glm::cross(u, v)));
         place[3 * t + i] = next[triangle[i]]++;
         by_position[place[3 * t + i]] = {normal, float(std::atan2(sine, glm::dot(u, v)))};
@@ -282,7 +294,18 @@ void MeshBuilder::note(const std::string& text) {
 
 Mesh MeshBuilder::take() {
   if (mesh_.materials.empty()) default_material();
-  mesh_.positions.shrink_to_fit();
+  mesh_.origin = choose_origin(exact_);
+  round_positions(exact_, mesh_);
+  const Rejected& rejected = mesh_.rejected;
+  const std::pair<uint64_t, const char*> left_out[] = {
+      {rejected.degenerate, "have no area"},
+      {rejected.non_finite, "have a corner that is not finite"},
+      {rejected.out_of_range, "refer to vertices that are not there"},
+      {rejected.invisible, "are wholly transparent"},
+      {rejected.collapsed, "are too small for single precision in a scene of this size"}};
+  for (const auto& [count, why] : left_out) {
+    if (count) note(std::to_string(count) + " triangles " + why + ", they are left out");
+  }
   return std::move(mesh_);
 }
 

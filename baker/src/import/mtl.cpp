@@ -28,43 +28,105 @@ bool read_factor(std::string_view line, float& factor) {
   return std::isfinite(value);
 }
 
+// "-option values... file name", which may hold spaces. Numbers end an option's values: -o, -s and -t take
+// one to three of them.
+MtlMap read_map(std::string_view line, std::set<std::string>& notes) {
+  MtlMap map;
+  const auto take_numbers = [&](int most, glm::dvec2* to) {
+    for (int i = 0; i < most; ++i) {
+      std::string_view ahead = line, word;
+      if (!take_word(ahead, word)) return;
+      const double value = number_of(word);
+      if (!std::isfinite(value)) return;
+      if (to && i < 2) (*to)[i] = value;
+      line = ahead;
+    }
+  };
+  while (true) {
+    std::string_view ahead = line, option, value;
+    if (!take_word(ahead, option) || option.size() < 2 || option[0] != '-' ||
+        (option[1] >= '0' && option[1] <= '9'))
+      break;
+    line = ahead;
+    if (option == "-o") {
+      take_numbers(3, &map.offset);
+    } else if (option == "-s") {
+      take_numbers(3, &map.scale);
+    } else if (option == "-t" || option == "-mm" || option == "-bm" || option == "-boost" ||
+               option == "-texres") {
+      take_numbers(option == "-t" ? 3 : option == "-mm" ? 2 : 1, nullptr);
+      if (option != "-texres") notes.insert("the option " + std::string(option) + " of a map is not read");
+    } else if (take_word(line, value)) {  // -clamp, -imfchan, -blendu, -blendv, -cc, -type
+      if (option == "-clamp") map.clamp = value == "on";
+      if (option == "-imfchan" && !value.empty()) map.channel = value[0];
+      if (option == "-cc" && value == "on") notes.insert("the option -cc of a map is not read");
+    }
+  }
+  map.file = std::string(trim(line));
+  return map;
+}
+
+// Where a map goes that is read; exporters write its name in any case.
+MtlMap* map_by(std::string_view word, MtlMaterial& entry) {
+  return equals_ignoring_case(word, "map_Kd")   ? &entry.color
+         : equals_ignoring_case(word, "map_Ke") ? &entry.emission
+         : equals_ignoring_case(word, "map_d")  ? &entry.opacity
+                                                : nullptr;
+}
+
 }  // namespace
 
-void read_mtl(const std::filesystem::path& path, Budget& budget, std::map<std::string, Material>& materials) {
+void read_mtl(const std::filesystem::path& path, Budget& budget,
+              std::map<std::string, MtlMaterial>& materials, std::set<std::string>& notes) {
   const std::string text = read_text(path, budget);
   std::string_view rest = text, line, word;
-  Material unnamed;
-  Material* material = &unnamed;
-  bool rough_given = false;
+  MtlMaterial unnamed, *entry = &unnamed;
+  bool rough_given = false, solid_given = false, color_given = false, emission_given = false;
+  const auto end_material = [&] {
+    if (!color_given && !entry->color.file.empty()) entry->material.base_color = glm::vec3(1);
+    if (!emission_given && !entry->emission.file.empty()) entry->material.emission = glm::vec3(1);
+  };
   while (take_line(rest, line)) {
     if (!take_word(line, word)) continue;
     if (word == "newmtl") {
+      end_material();
       const std::string name(trim(line));
-      budget.charge(path.string(), sizeof(Material) + 64 + 2 * name.size());
-      const auto [at, fresh] = materials.try_emplace(name, Material{});
-      material = fresh ? &at->second : &unnamed;
-      material->name = name;
-      rough_given = false;
+      budget.charge(path.string(), sizeof(MtlMaterial) + 64 + 2 * name.size());
+      const auto [at, fresh] = materials.try_emplace(name, MtlMaterial{});
+      entry = fresh ? &at->second : &unnamed;
+      entry->material.name = name;
+      rough_given = solid_given = color_given = emission_given = false;
       continue;
     }
+    Material& material = entry->material;
     float factor = 0;
     if (word == "Kd") {
-      read_color(line, material->base_color);
+      read_color(line, material.base_color);
+      color_given = true;
     } else if (word == "Ke") {
-      read_color(line, material->emission);
+      read_color(line, material.emission);
+      emission_given = true;
     } else if (word == "d" && read_factor(line, factor)) {
-      material->opacity = factor;
-    } else if (word == "Tr" && read_factor(line, factor)) {
-      material->opacity = 1.0f - factor;
+      material.opacity = factor;
+      solid_given = true;
+    } else if (word == "Tr" && !solid_given && read_factor(line, factor)) {
+      material.opacity = 1.0f - factor;
     } else if (word == "Pr" && read_factor(line, factor)) {
-      material->roughness = factor;
+      material.roughness = factor;
       rough_given = true;
     } else if (word == "Pm" && read_factor(line, factor)) {
-      material->metallic = factor;
+      material.metallic = factor;
     } else if (word == "Ns" && !rough_given && read_factor(line, factor) && factor >= 0) {
-      material->roughness = std::sqrt(2.0f / (factor + 2.0f));  // the Beckmann width of a Phong lobe
+      material.roughness = std::sqrt(2.0f / (factor + 2.0f));  // the Beckmann width of a Phong lobe
+    } else if (MtlMap* map = map_by(word, *entry)) {
+      budget.charge(path.string(), 2 * line.size() + 64);
+      *map = read_map(line, notes);
+    } else if (word.starts_with("map_") || word == "bump" || word == "norm" || word == "disp" ||
+               word == "decal" || word == "refl") {
+      notes.insert(std::string(word) + " is not read");
     }
   }
+  end_material();
 }
 
 }  // namespace lsp

@@ -1,9 +1,12 @@
-// Wavefront OBJ: polygons, normals, materials. Lines, points, curves and surfaces hold no triangles.
+// Wavefront OBJ: polygons, normals, materials, texture coordinates, vertex colours. Lines, points, curves and
+// surfaces hold no triangles.
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
 
 #include "import/mtl.h"
+#include "import/mtl_textures.h"
 #include "import/polygons.h"
 #include "import/readers.h"
 #include "import/source_file.h"
@@ -18,7 +21,7 @@ constexpr std::string_view kDefaultMaterial{};
 class ObjReader {
  public:
   ObjReader(const std::filesystem::path& path, MeshBuilder& builder)
-      : path_(path), file_(path.string()), builder_(builder) {}
+      : path_(path), file_(path.string()), builder_(builder), textures_(file_, builder) {}
 
   void read() {
     const std::string text = read_text(path_, builder_.budget());
@@ -44,7 +47,7 @@ class ObjReader {
       builder_.note(file_ + ": " + std::to_string(other_elements_) +
                     " lines, points, curves or surfaces hold no triangle");
     }
-    if (colored_) builder_.note(file_ + ": vertex colours are not used");
+    make_colors_linear();
     add_polygons(file_, soup_, builder_);
   }
 
@@ -53,12 +56,13 @@ class ObjReader {
     std::string_view word;
     if (!take_word(line, word)) return;
     if (word == "v") {
-      const glm::vec3 position = read_vector(line);
-      push(soup_.positions, position);
-      std::string_view more;
-      colored_ = colored_ || (take_word(line, more) && take_word(line, more));
+      push(soup_.positions, read_vector(line));
+      read_vertex_color(line);
     } else if (word == "vn") {
-      push(soup_.normals, read_vector(line));
+      push(soup_.normals, glm::vec3(read_vector(line)));
+    } else if (word == "vt") {
+      const glm::dvec3 at = read_vector(line);
+      push(soup_.texcoords, glm::dvec2(at.x, std::isnan(at.y) ? 0.0 : 1 - at.y));
     } else if (word == "f" || word == "fo") {
       read_face(line);
     } else if (word == "usemtl") {
@@ -77,10 +81,10 @@ class ObjReader {
   }
 
   // What is not there is NaN: a vertex that takes part in a face then has the face refused by name.
-  static glm::vec3 read_vector(std::string_view& line) {
-    glm::vec3 vector(std::numeric_limits<float>::quiet_NaN());
+  static glm::dvec3 read_vector(std::string_view& line) {
+    glm::dvec3 vector(std::numeric_limits<double>::quiet_NaN());
     std::string_view word;
-    for (int i = 0; i < 3 && take_word(line, word); ++i) vector[i] = float(number_of(word));
+    for (int i = 0; i < 3 && take_word(line, word); ++i) vector[i] = number_of(word);
     return vector;
   }
 
@@ -93,16 +97,44 @@ class ObjReader {
     return index > 0 && index < int64_t{kNoIndex} ? uint32_t(index - 1) : kNoIndex;
   }
 
+  // "v x y z r g b", an extension of many programs. Vertices without are white.
+  void read_vertex_color(std::string_view line) {
+    glm::vec3 color(1);
+    std::string_view word;
+    int count = 0;
+    for (; count < 3 && take_word(line, word); ++count) color[count] = float(number_of(word));
+    const bool given = count == 3 && std::isfinite(color.x + color.y + color.z);
+    if (!given && soup_.colors.empty()) return;
+    while (soup_.colors.size() + 1 < soup_.positions.size()) push(soup_.colors, glm::vec3(1));
+    push(soup_.colors, given ? color : glm::vec3(1));
+    if (given) largest_color_ = std::max(largest_color_, std::max(color.x, std::max(color.y, color.z)));
+  }
+
+  // They are on the sRGB curve, from 0 to 1 or to 255.
+  void make_colors_linear() {
+    const double scale = largest_color_ > 1 ? 255 : 1;
+    for (glm::vec3& color : soup_.colors) {
+      for (int k = 0; k < 3; ++k)
+        color[k] = float(linear_of_srgb(std::clamp(double(color[k]) / scale, 0.0, 1.0)));
+    }
+  }
+
   void read_face(std::string_view line) {
     std::string_view word;
     while (take_word(line, word)) {
       if (word.front() == '#') break;
       const size_t slash = word.find('/');
       push(soup_.corners, resolve(word.substr(0, slash), soup_.positions.size()));
-      uint32_t normal = kNoIndex;
+      uint32_t normal = kNoIndex, texcoord = kNoIndex;
       if (slash != word.npos) {
         const size_t second = word.find('/', slash + 1);
+        texcoord = resolve(word.substr(slash + 1, second - slash - 1), soup_.texcoords.size());
         if (second != word.npos) normal = resolve(word.substr(second + 1), soup_.normals.size());
+      }
+      if (texcoord != kNoIndex || !soup_.corner_texcoords.empty()) {
+        while (soup_.corner_texcoords.size() + 1 < soup_.corners.size())
+          push(soup_.corner_texcoords, kNoIndex);
+        push(soup_.corner_texcoords, texcoord);
       }
       if (normal != kNoIndex || !soup_.corner_normals.empty()) {
         while (soup_.corner_normals.size() + 1 < soup_.corners.size()) push(soup_.corner_normals, kNoIndex);
@@ -122,7 +154,7 @@ class ObjReader {
   }
 
   // Reads the library `name`, if there is a file by that name.
-  bool try_library(std::string name, std::map<std::string, Material>& materials) {
+  bool try_library(std::string name, std::map<std::string, MtlMaterial>& materials) {
     // A hostile line may name the same large file thousands of times.
     constexpr size_t kMaxTries = 1000;
     if (++libraries_tried_ > kMaxTries) return true;
@@ -132,14 +164,22 @@ class ObjReader {
          {path_.parent_path() / name, path_.parent_path() / std::filesystem::path(name).filename()}) {
       std::error_code error;
       if (!std::filesystem::is_regular_file(path, error)) continue;
-      read_mtl(path, builder_.budget(), materials);
+      std::set<std::string> notes;
+      std::map<std::string, MtlMaterial> found;
+      read_mtl(path, builder_.budget(), found, notes);
+      builder_.add_source(path);
+      for (const std::string& note : notes) builder_.note(path.string() + ": " + note);
+      for (auto& [material, entry] : found) {
+        entry.folder = path.parent_path();
+        materials.try_emplace(material, std::move(entry));
+      }
       return true;
     }
     return false;
   }
 
   // A mtllib line names one file, which may hold spaces, or several.
-  void read_libraries(const std::string& words, std::map<std::string, Material>& materials) {
+  void read_libraries(const std::string& words, std::map<std::string, MtlMaterial>& materials) {
     if (words.empty() || words.find('\0') != words.npos || try_library(words, materials)) return;
     std::string_view rest = words, word;
     while (take_word(rest, word)) {
@@ -151,7 +191,7 @@ class ObjReader {
 
   // Replaces the numbers of names that faces carry by the builder's materials.
   void resolve_materials() {
-    std::map<std::string, Material> defined;
+    std::map<std::string, MtlMaterial> defined;
     std::set<std::string> seen;
     for (const std::string& library : libraries_) {
       if (seen.insert(library).second) read_libraries(library, defined);
@@ -166,9 +206,9 @@ class ObjReader {
         Material fallback;
         fallback.name = name;
         if (found == defined.end() && !name.empty()) ++missing;
-        id = found != defined.end() ? builder_.add_material(found->second)
-             : name.empty()         ? builder_.default_material()
-                                    : builder_.add_material(fallback);
+        id = name.empty() && found == defined.end() ? builder_.default_material()
+             : found == defined.end()               ? builder_.add_material(fallback)
+                                                    : textures_.add(found->second, soup_.surfaces);
       }
       material = id;
     }
@@ -181,6 +221,7 @@ class ObjReader {
   const std::filesystem::path& path_;
   const std::string file_;
   MeshBuilder& builder_;
+  MtlTextures textures_;
   PolygonSoup soup_;
   // In order, not hashed: a file can choose names that a hash table takes ages over.
   std::map<std::string, uint32_t> names_{{std::string(kDefaultMaterial), 0}};
@@ -189,7 +230,7 @@ class ObjReader {
   std::vector<std::string> libraries_;
   size_t libraries_tried_ = 0;
   uint64_t other_elements_ = 0;
-  bool colored_ = false;
+  float largest_color_ = 0;
 };
 
 }  // namespace

@@ -1,4 +1,7 @@
-// Geomview's OFF: [ST][C][N][4]OFF, ASCII. Colours and texture coordinates are skipped.
+// Geomview's OFF: [ST][C][N][4]OFF, ASCII. Texture coordinates are skipped.
+#include <algorithm>
+#include <cmath>
+
 #include "import/polygons.h"
 #include "import/readers.h"
 #include "import/source_file.h"
@@ -56,7 +59,8 @@ class OffReader {
     }
     for (uint64_t i = 0; i < vertex_count; ++i) read_vertex();
     for (uint64_t i = 0; i < face_count; ++i) read_face();
-    if (colored_) builder_.note(file_ + ": colours are not used");
+    if (unread_) builder_.note(file_ + ": colours by number, alpha or texture coordinates are not read");
+    if (!colored_) soup_.face_colors.clear();
     soup_.material = builder_.default_material();
     add_polygons(file_, soup_, builder_);
   }
@@ -92,7 +96,7 @@ class OffReader {
       return true;
     };
     take("ST");
-    take("C");
+    has_colors_ = take("C");
     has_normals_ = take("N");
     homogeneous_ = take("4");
     if (take("n")) {
@@ -122,13 +126,44 @@ class OffReader {
     glm::dvec3 position;
     for (int i = 0; i < 3; ++i) position[i] = number_of(word());
     if (homogeneous_) position /= number_of(word());
-    push(soup_.positions, glm::vec3(position));
+    push(soup_.positions, position);
     if (has_normals_) {
       glm::vec3 normal;
       for (int i = 0; i < 3; ++i) normal[i] = float(number_of(word()));
       push(soup_.normals, normal);
     }
-    colored_ = words_.skip_line() || colored_;
+    glm::vec3 color(1);
+    const bool given = has_colors_ && read_color(color);
+    if (given || !soup_.colors.empty()) {
+      while (soup_.colors.size() + 1 < soup_.positions.size()) push(soup_.colors, glm::vec3(1));
+      push(soup_.colors, color);
+    }
+    unread_ = words_.skip_line() || unread_;
+  }
+
+  // Three numbers on the sRGB curve, from 0 to 255 where they are whole, else from 0 to 1; in linear light.
+  // What follows them is left. False, with nothing read, where there are not three.
+  bool read_color(glm::vec3& color) {
+    Words ahead = words_;
+    double values[3];
+    bool whole = true;
+    for (double& value : values) {
+      std::string_view text;
+      if (!ahead.line_goes_on() || !ahead.next(text)) return false;
+      value = number_of(text);
+      if (!std::isfinite(value)) return false;
+      whole = whole && text.find('.') == text.npos;
+    }
+    words_ = ahead;
+    for (int i = 0; i < 3; ++i)
+      color[i] = float(linear_of_srgb(std::clamp(values[i] / (whole ? 255 : 1), 0.0, 1.0)));
+    std::string_view alpha;
+    if (words_.line_goes_on()) {
+      words_.next(alpha);
+      const double value = number_of(alpha);
+      unread_ = unread_ || value != (whole ? 255 : 1);
+    }
+    return true;
   }
 
   // "n i1 .. in", broken over lines as one likes, and a colour up to the end of the last line.
@@ -140,8 +175,10 @@ class OffReader {
       push(soup_.corners, good ? uint32_t(index) : kNoIndex);
       if (has_normals_) push(soup_.corner_normals, soup_.corners.back());
     }
-    colored_ = words_.skip_line() || colored_;
-    soup_.end_face(file_, builder_.budget());
+    glm::vec3 color(1);
+    colored_ = read_color(color) || colored_;
+    unread_ = words_.skip_line() || unread_;
+    if (soup_.end_face(file_, builder_.budget())) push(soup_.face_colors, color);
   }
 
   const std::string file_;
@@ -151,7 +188,9 @@ class OffReader {
   PolygonSoup soup_;
   bool has_normals_ = false;
   bool homogeneous_ = false;
-  bool colored_ = false;
+  bool has_colors_ = false;
+  bool colored_ = false;  // some face is
+  bool unread_ = false;
 };
 
 }  // namespace

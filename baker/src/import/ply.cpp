@@ -1,8 +1,10 @@
-// PLY, ASCII and binary of either byte order: vertex x y z, nx ny nz; face vertex_indices (or vertex_index);
-// tristrips. Every other element and property is skipped by its type.
+// PLY, ASCII and binary of either byte order: vertex x y z, nx ny nz, red green blue; face vertex_indices (or
+// vertex_index); tristrips. Every other element and property is skipped by its type.
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstring>
+#include <set>
 
 #include "import/polygons.h"
 #include "import/readers.h"
@@ -68,6 +70,7 @@ bool type_of(std::string_view word, Type& type) {
 struct Header {
   Encoding encoding = Encoding::kAscii;
   std::vector<Element> elements;
+  std::set<std::string> textures;  // named by comments, as some programs do
 };
 
 Header read_header(const std::string& file, std::string_view& text) {
@@ -76,7 +79,11 @@ Header read_header(const std::string& file, std::string_view& text) {
   if (!take_line(text, line) || trim(line) != "ply") fail(file, "does not start as a PLY file");
   bool encoded = false;
   while (take_line(text, line)) {
-    if (!take_word(line, word) || word == "comment" || word == "obj_info") continue;
+    if (!take_word(line, word) || word == "obj_info") continue;
+    if (word == "comment") {
+      if (take_word(line, word) && word == "TextureFile") header.textures.insert(std::string(trim(line)));
+      continue;
+    }
     if (word == "end_header") {
       if (!encoded) fail(file, "names no format in its header");
       return header;
@@ -248,7 +255,9 @@ class PlyReader {
         skip(element);
       }
     }
-    if (colored_) builder_.note(file_ + ": colours are not used");
+    for (const std::string& name : header.textures)
+      builder_.note(file_ + ": the texture " + name + " is not read, its coordinates neither");
+    if (translucent_) builder_.note(file_ + ": alpha of vertices or faces is not read, all count as solid");
     soup_.material = builder_.default_material();
     add_polygons(file_, soup_, builder_);
   }
@@ -283,40 +292,89 @@ class PlyReader {
     }
   }
 
+  // Where the properties of an element's colour are: their places, and what makes them 0 to 1.
+  struct ColorProperties {
+    int places[4] = {-1, -1, -1, -1};
+    double scale = 1;
+    bool there() const { return places[0] >= 0 && places[1] >= 0 && places[2] >= 0; }
+    // Which component a property is, -1 for none.
+    int component(size_t property) const {
+      for (int i = 0; i < 4; ++i) {
+        if (places[i] == int(property)) return i;
+      }
+      return -1;
+    }
+  };
+
+  static ColorProperties color_properties(const Element& element) {
+    constexpr std::string_view kNames[] = {"red", "green", "blue", "alpha"};
+    ColorProperties out;
+    for (size_t k = 0; k < element.properties.size(); ++k) {
+      std::string_view name = element.properties[k].name;
+      if (name.starts_with("diffuse_")) name.remove_prefix(8);
+      for (int i = 0; i < 4; ++i) {
+        if (name != kNames[i] || element.properties[k].is_list || out.places[i] >= 0) continue;
+        out.places[i] = int(k);
+        const Type type = element.properties[k].type;
+        if (type == Type::kUint8) out.scale = 255;
+        if (type == Type::kUint16) out.scale = 65535;
+      }
+    }
+    return out;
+  }
+
+  // What was read of a colour, on the sRGB curve, in linear light.
+  glm::vec3 linear_color(const glm::dvec4& color, double scale) {
+    glm::vec3 out;
+    for (int i = 0; i < 3; ++i) {
+      const double value = color[i] / scale;
+      out[i] = float(linear_of_srgb(std::isfinite(value) ? std::clamp(value, 0.0, 1.0) : 1.0));
+    }
+    translucent_ = translucent_ || color.a < scale;
+    return out;
+  }
+
   void read_vertices(const Element& element) {
-    // Where each property goes: 0..2 position, 3..5 normal, -1 nowhere.
+    // Where each property goes: 0..2 position, 3..5 normal, 6.. colour, -1 nowhere.
     constexpr std::string_view kTargets[] = {"x", "y", "z", "nx", "ny", "nz"};
+    const ColorProperties color = color_properties(element);
     std::vector<int> targets;
     int seen = 0;
-    for (const Property& property : element.properties) {
+    for (size_t k = 0; k < element.properties.size(); ++k) {
+      const Property& property = element.properties[k];
       int target = -1;
       for (int i = 0; i < 6; ++i) {
         if (property.name == kTargets[i] && !property.is_list && !(seen >> i & 1)) target = i;
       }
       if (target >= 0) seen |= 1 << target;
+      if (const int component = color.component(k); color.there() && component >= 0) target = 6 + component;
       targets.push_back(target);
-      colored_ = colored_ || property.name == "red" || property.name == "diffuse_red";
     }
     if (element.count > 0 && (seen & 7) != 7) fail(file_, "has vertices without x, y and z");
     if (element.count >= kNoIndex - soup_.positions.size()) {
       throw Failure(Exit::kLimit, file_, "holds more than 2^32 - 2 vertices, split the mesh");
     }
-    builder_.budget().charge(file_, element.count, (has_normals_ ? 2 : 1) * sizeof(glm::vec3));
+    builder_.budget().charge(file_, element.count,
+                             sizeof(glm::dvec3) + (has_normals_ ? sizeof(glm::vec3) : 0) +
+                                 (color.there() ? sizeof(glm::vec3) : 0));
     soup_.positions.reserve(soup_.positions.size() + element.count);
     if (has_normals_) soup_.normals.reserve(soup_.normals.size() + element.count);
     const size_t count = element.properties.size();
     for (uint64_t i = 0; i < element.count; ++i) {
-      glm::vec3 vectors[2] = {};
+      double values[10] = {0, 0, 0, 0, 0, 0, 0, 0, 0, color.scale};
       for (size_t k = 0; k < count; ++k) {
         if (targets[k] < 0) {
           body_.skip(element.properties[k]);
         } else {
-          vectors[targets[k] / 3][targets[k] % 3] = float(body_.number(element.properties[k].type));
+          values[targets[k]] = body_.number(element.properties[k].type);
         }
       }
       body_.end_element();
-      soup_.positions.push_back(vectors[0]);
-      if (has_normals_) soup_.normals.push_back(vectors[1]);
+      soup_.positions.push_back({values[0], values[1], values[2]});
+      if (has_normals_) soup_.normals.push_back(glm::vec3(values[3], values[4], values[5]));
+      if (!color.there()) continue;
+      soup_.colors.resize(soup_.positions.size() - 1, glm::vec3(1));
+      soup_.colors.push_back(linear_color({values[6], values[7], values[8], values[9]}, color.scale));
     }
   }
 
@@ -326,13 +384,18 @@ class PlyReader {
       const Property& property = element.properties[k];
       if (property.is_list && (property.name == "vertex_indices" || property.name == "vertex_index"))
         list = k;
-      colored_ = colored_ || property.name == "red" || property.name == "diffuse_red";
     }
+    const ColorProperties color = color_properties(element);
     if (list == element.properties.size()) return skip(element);
     std::vector<uint32_t> strip;
     for (uint64_t i = 0; i < element.count; ++i) {
+      glm::dvec4 rgba(0, 0, 0, color.scale);
       for (size_t k = 0; k < element.properties.size(); ++k) {
         const Property& property = element.properties[k];
+        if (const int component = color.component(k); color.there() && component >= 0) {
+          rgba[component] = body_.number(property.type);
+          continue;
+        }
         if (k != list) {
           body_.skip(property);
           continue;
@@ -359,6 +422,10 @@ class PlyReader {
         }
       }
       body_.end_element();
+      if (!color.there()) continue;
+      soup_.face_colors.resize(std::min(soup_.face_colors.size(), soup_.face_ends.size()));
+      const glm::vec3 linear = linear_color(rgba, color.scale);
+      while (soup_.face_colors.size() < soup_.face_ends.size()) push(soup_.face_colors, linear);
     }
   }
 
@@ -388,7 +455,7 @@ class PlyReader {
   MeshBuilder& builder_;
   PolygonSoup soup_;
   bool has_normals_ = false;
-  bool colored_ = false;
+  bool translucent_ = false;
 };
 
 }  // namespace

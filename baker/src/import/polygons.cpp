@@ -7,8 +7,8 @@
 namespace lsp {
 namespace {
 
-// Point tests allowed for one file's concave polygons: a second or so.
-constexpr uint64_t kEarWork = 200'000'000;
+// Point tests allowed for one file's concave polygons: seconds.
+constexpr uint64_t kEarWork = 300'000'000;
 
 double area2(const glm::dvec2& a, const glm::dvec2& b, const glm::dvec2& c) {
   return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
@@ -20,19 +20,19 @@ void fan(std::span<const uint32_t> ring, std::vector<glm::uvec3>& out) {
 
 // The polygon seen along its normal (Newell's, the sum of the fan's cross products), counter-clockwise. False
 // where it has no area.
-bool project(std::span<const glm::vec3> corners, std::vector<glm::dvec2>& flat) {
-  const glm::dvec3 origin(corners[0]);
+bool project(std::span<const glm::dvec3> corners, std::vector<glm::dvec2>& flat) {
+  const glm::dvec3 origin = corners[0];
   glm::dvec3 normal(0);
   for (size_t i = 2; i < corners.size(); ++i) {
-    normal += glm::cross(glm::dvec3(corners[i - 1]) - origin, glm::dvec3(corners[i]) - origin);
+    normal += glm::cross(corners[i - 1] - origin, corners[i] - origin);
   }
   const glm::dvec3 size = glm::abs(normal);
   const int axis = size.x > size.y ? (size.x > size.z ? 0 : 2) : (size.y > size.z ? 1 : 2);
   if (!(size[axis] > 0) || !std::isfinite(size[axis])) return false;
   const int u = (axis + 1) % 3, v = (axis + 2) % 3;
   flat.clear();
-  for (const glm::vec3& corner : corners) {
-    const glm::dvec3 p = glm::dvec3(corner) - origin;
+  for (const glm::dvec3& corner : corners) {
+    const glm::dvec3 p = corner - origin;
     flat.push_back(normal[axis] > 0 ? glm::dvec2(p[u], p[v]) : glm::dvec2(p[v], p[u]));
   }
   return true;
@@ -47,20 +47,6 @@ bool is_convex(std::span<const glm::dvec2> flat) {
   return true;
 }
 
-bool is_ear(std::span<const glm::dvec2> flat, std::span<const uint32_t> ring, size_t i) {
-  const size_t n = ring.size();
-  const glm::dvec2 a = flat[ring[(i + n - 1) % n]], b = flat[ring[i]], c = flat[ring[(i + 1) % n]];
-  if (!(area2(a, b, c) > 0)) return false;
-  for (size_t k = 0; k < n; ++k) {
-    if (k == i || k == (i + 1) % n || k == (i + n - 1) % n) continue;
-    const glm::dvec2 p = flat[ring[k]];
-    // Corners that repeat a position (the bridge to a hole) touch the ear without cutting it.
-    if (p == a || p == b || p == c) continue;
-    if (area2(a, b, p) >= 0 && area2(b, c, p) >= 0 && area2(c, a, p) >= 0) return false;
-  }
-  return true;
-}
-
 }  // namespace
 
 bool PolygonSoup::end_face(const std::string& file, Budget& budget) {
@@ -69,6 +55,7 @@ bool PolygonSoup::end_face(const std::string& file, Budget& budget) {
     ++too_small;
     corners.resize(begin);
     if (!corner_normals.empty()) corner_normals.resize(begin);
+    if (!corner_texcoords.empty()) corner_texcoords.resize(begin);
     return false;
   }
   if (corners.size() >= kNoIndex)
@@ -79,78 +66,128 @@ bool PolygonSoup::end_face(const std::string& file, Budget& budget) {
 
 uint64_t PolygonSoup::triangle_count() const { return corners.size() - 2 * face_ends.size(); }
 
-void triangulate(std::span<const glm::vec3> corners, std::vector<glm::uvec3>& out, uint64_t& work) {
+EarCut triangulate(std::span<const glm::dvec3> corners, std::vector<glm::uvec3>& out, uint64_t& work) {
   static thread_local std::vector<uint32_t> ring;
   static thread_local std::vector<glm::dvec2> flat;
+  static thread_local EarClipper clipper;
   ring.resize(corners.size());
   for (size_t i = 0; i < ring.size(); ++i) ring[i] = uint32_t(i);
-  if (corners.size() < 4 || work == 0 || !project(corners, flat) || is_convex(flat)) return fan(ring, out);
-
-  size_t start = 0;
-  while (ring.size() > 3) {
-    const size_t n = ring.size();
-    size_t tried = 0;
-    for (; tried < n; ++tried) {
-      const size_t i = (start + tried) % n;
-      work = work > n ? work - n : 0;
-      if (work == 0) return fan(ring, out);
-      if (!is_ear(flat, ring, i)) continue;
-      out.push_back({ring[(i + n - 1) % n], ring[i], ring[(i + 1) % n]});
-      ring.erase(ring.begin() + std::ptrdiff_t(i));
-      start = i % ring.size();
-      break;
-    }
-    if (tried == n) break;  // no ear: it crosses itself, or what is left is a line
+  if (corners.size() < 4 || work == 0 || !project(corners, flat) || is_convex(flat)) {
+    fan(ring, out);
+    return work == 0 ? EarCut::kGaveUp : EarCut::kRight;
   }
-  fan(ring, out);
+  return clipper.cut(flat, out, work);
 }
+
+namespace {
+
+// A triangle: three corners of a face.
+struct Piece {
+  uint32_t face;
+  glm::uvec3 corners;  // into the soup's
+};
+
+uint32_t material_of(const PolygonSoup& soup, uint32_t face) {
+  return face < soup.materials.size() ? soup.materials[face] : soup.material;
+}
+
+// Calls add(piece) for all triangles of all faces in order.
+template <typename Add>
+void cut_faces(const std::string& file, const PolygonSoup& soup, MeshBuilder& builder, const Add& add) {
+  std::vector<glm::dvec3> polygon;
+  std::vector<glm::uvec3> cut;
+  uint64_t work = kEarWork, crossed = 0;
+  uint32_t begin = 0;
+  for (uint32_t face = 0; face < soup.face_ends.size(); ++face) {
+    const uint32_t end = soup.face_ends[face];
+    polygon.clear();
+    for (uint32_t k = begin; k < end && end - begin > 3 && soup.corners[k] < soup.positions.size(); ++k)
+      polygon.push_back(soup.positions[soup.corners[k]]);
+    cut.clear();
+    if (polygon.size() == end - begin) {
+      crossed += triangulate(polygon, cut, work) == EarCut::kCrossed;
+    } else {  // a triangle, or one where the builder rejects what touches the missing corner, and keeps the
+              // rest
+      for (uint32_t i = 2; i < end - begin; ++i) cut.push_back({0, i - 1, i});
+    }
+    for (const glm::uvec3& local : cut) add(Piece{face, local + begin});
+    begin = end;
+  }
+  if (crossed) {
+    builder.note(file + ": " + std::to_string(crossed) +
+                 " polygons cross themselves, their triangles do not fill them exactly");
+  }
+  if (work == 0) {
+    builder.note(file + ": concave polygons are too many or too large to cut well, the last are cut as fans");
+  }
+}
+
+// A colour for each piece.
+std::vector<TriangleColor> piece_colors(const PolygonSoup& soup, std::span<const Piece> pieces,
+                                        MeshBuilder& builder) {
+  std::map<uint32_t, std::vector<uint32_t>> by_material;
+  for (uint32_t i = 0; i < pieces.size(); ++i) by_material[material_of(soup, pieces[i].face)].push_back(i);
+  const bool by_vertex = !soup.colors.empty() || !soup.face_colors.empty();
+  std::vector<TriangleColor> colors(pieces.size());
+  for (const auto& [material, list] : by_material) {
+    const Material& plain = builder.mesh().materials[material];
+    Surface surface{plain.base_color, plain.emission, {AlphaMode::kBlend, plain.opacity}, {}, {}};
+    // A grey that stands for no material must not darken what the vertices say.
+    if (by_vertex && builder.is_default(material)) surface.base_color = glm::vec3(1);
+    if (const auto found = soup.surfaces.find(material); found != soup.surfaces.end())
+      surface = found->second;
+    const std::vector<TriangleColor> own =
+        mean_colors(surface, list.size(), [&](size_t t, SurfaceCorner(&out)[3]) {
+          const Piece& piece = pieces[list[t]];
+          for (int i = 0; i < 3; ++i) {
+            const uint32_t corner = piece.corners[i];
+            const uint32_t uv =
+                corner < soup.corner_texcoords.size() ? soup.corner_texcoords[corner] : kNoIndex;
+            const glm::dvec2 at = uv < soup.texcoords.size() ? soup.texcoords[uv] : glm::dvec2(0);
+            out[i].base_uv = surface.base.place(at);
+            out[i].glow_uv = surface.glow.place(at);
+            out[i].color = glm::vec4(1);
+            if (soup.corners[corner] < soup.colors.size())
+              out[i].color = {soup.colors[soup.corners[corner]], 1};
+            if (piece.face < soup.face_colors.size()) out[i].color = {soup.face_colors[piece.face], 1};
+          }
+        });
+    for (size_t i = 0; i < list.size(); ++i) colors[list[i]] = own[i];
+  }
+  return colors;
+}
+
+}  // namespace
 
 void add_polygons(const std::string& file, const PolygonSoup& soup, MeshBuilder& builder) {
   builder.begin(file, soup.positions, soup.triangle_count(), MissingNormals::kSmooth);
-  std::vector<glm::vec3> polygon;
-  std::vector<glm::uvec3> cut;
-  uint64_t work = kEarWork;
-  const auto add = [&](size_t begin, const glm::uvec3& local, uint32_t material) {
+  const auto add = [&](const Piece& piece, const TriangleColor* color) {
     glm::uvec3 triangle;
     glm::vec3 normals[3];
     for (int i = 0; i < 3; ++i) {
-      triangle[i] = soup.corners[begin + local[i]];
-      const uint32_t normal = soup.corner_normals.empty() ? kNoIndex : soup.corner_normals[begin + local[i]];
+      const uint32_t corner = piece.corners[i];
+      triangle[i] = soup.corners[corner];
+      const uint32_t normal = soup.corner_normals.empty() ? kNoIndex : soup.corner_normals[corner];
       normals[i] = normal < soup.normals.size() ? soup.normals[normal]
                                                 : glm::vec3(std::numeric_limits<float>::quiet_NaN());
     }
-    builder.add(triangle, normals, material);
+    builder.add(triangle, normals, material_of(soup, piece.face), color);
   };
-  size_t begin = 0;
-  for (size_t face = 0; face < soup.face_ends.size(); ++face) {
-    const size_t end = soup.face_ends[face];
-    const uint32_t material = face < soup.materials.size() ? soup.materials[face] : soup.material;
-    if (end - begin == 3) {
-      add(begin, {0, 1, 2}, material);
-    } else {
-      polygon.clear();
-      bool usable = true;
-      for (size_t k = begin; k < end && usable; ++k) {
-        usable = soup.corners[k] < soup.positions.size();
-        if (usable) polygon.push_back(soup.positions[soup.corners[k]]);
-      }
-      cut.clear();
-      if (usable) {
-        triangulate(polygon, cut, work);
-      } else {  // the builder rejects the fan's triangles that touch the missing corner, and keeps the others
-        for (uint32_t i = 2; i < end - begin; ++i) cut.push_back({0, i - 1, i});
-      }
-      for (const glm::uvec3& local : cut) add(begin, local, material);
-    }
-    begin = end;
+  if (soup.has_colors()) {
+    builder.budget().charge(file, soup.triangle_count(),
+                            sizeof(Piece) + 2 * sizeof(TriangleColor) + sizeof(uint32_t));
+    std::vector<Piece> pieces;
+    pieces.reserve(soup.triangle_count());
+    cut_faces(file, soup, builder, [&](const Piece& piece) { pieces.push_back(piece); });
+    const std::vector<TriangleColor> colors = piece_colors(soup, pieces, builder);
+    for (size_t i = 0; i < pieces.size(); ++i) add(pieces[i], &colors[i]);
+  } else {
+    cut_faces(file, soup, builder, [&](const Piece& piece) { add(piece, nullptr); });
   }
   builder.end();
   if (soup.too_small) {
     builder.note(file + ": " + std::to_string(soup.too_small) +
                  " faces with fewer than three corners hold no triangle");
-  }
-  if (work == 0) {
-    builder.note(file + ": concave polygons are too many or too large to cut well, the last are cut as fans");
   }
 }
 

@@ -1,4 +1,6 @@
 // STL, binary and ASCII.
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 
 #include "import/polygons.h"
@@ -21,43 +23,89 @@ uint32_t binary_count(std::string_view bytes) {
   return count;
 }
 
-// Whether the text starts as ASCII STL does. Binary headers may start with "solid" too, so this is asked only
-// where the size does not say that the file is binary.
+// Whether this is text. Binary headers may start with "solid" too; no line behind them then starts with a
+// facet, or the end of the solid.
 bool looks_ascii(std::string_view bytes) {
-  std::string_view rest = bytes.substr(0, 4096), line, word;
+  constexpr size_t kLook = 65536;
+  std::string_view rest = bytes.substr(0, kLook), line, word;
+  bool first = true;
   while (take_line(rest, line)) {
-    if (take_word(line, word))
-      return equals_ignoring_case(word, "solid") || equals_ignoring_case(word, "facet");
+    if (!take_word(line, word)) continue;
+    const bool keyword = equals_ignoring_case(word, "facet") || equals_ignoring_case(word, "endsolid");
+    if (keyword && word.data() >= bytes.data() + std::min(bytes.size(), kHeaderBytes)) return true;
+    if (first && !keyword && !equals_ignoring_case(word, "solid")) return false;
+    first = false;
   }
-  return false;
+  return !first && bytes.size() < kHeaderBytes;
+}
+
+// Whether bytes read as a triangle hold one: a tail of anything else will not.
+bool is_plausible(std::string_view triangle) {
+  float corners[9];
+  std::memcpy(corners, triangle.data() + sizeof(glm::vec3), sizeof corners);
+  bool some = false;
+  for (const float value : corners) {
+    if (!std::isfinite(value) || std::abs(value) > 1e20f || (value != 0 && std::abs(value) < 1e-20f))
+      return false;
+    some = some || value != 0;
+  }
+  return some;
+}
+
+// How many triangles a binary file holds. Writers that stream leave the count 0 or at its largest, others
+// count wrong; where whole triangles fill the file up, these are what was meant.
+uint32_t count_triangles(const std::string& file, std::string_view bytes, MeshBuilder& builder) {
+  const uint64_t declared = binary_count(bytes), fits = (bytes.size() - kHeaderBytes) / kTriangleBytes;
+  const bool whole = (bytes.size() - kHeaderBytes) % kTriangleBytes == 0;
+  if (declared == fits && whole) return uint32_t(declared);
+  bool all = fits > 0 && fits < kNoIndex && (whole || declared == 0);
+  for (uint64_t i = std::min(declared, fits); i < fits && all; ++i)
+    all = is_plausible(bytes.substr(kHeaderBytes + i * kTriangleBytes, kTriangleBytes));
+  if (all) {
+    builder.note(file + ": declares " + std::to_string(declared) + " triangles and holds " +
+                 std::to_string(fits) + ", all of them are read");
+    return uint32_t(fits);
+  }
+  if (declared > fits) {
+    throw Failure(Exit::kInvalid, file,
+                  "declares " + std::to_string(declared) + " triangles and has bytes for " +
+                      std::to_string(fits) + ", it is cut short or no STL file: export or copy it again");
+  }
+  builder.note(file + ": bytes after the last triangle are not used");
+  return uint32_t(declared);
 }
 
 void read_binary(const std::string& file, std::string_view bytes, uint32_t count, PolygonSoup& soup,
                  MeshBuilder& builder) {
-  constexpr uint64_t kSoupBytes = 4 * sizeof(glm::vec3) + 7 * sizeof(uint32_t);
+  constexpr uint64_t kSoupBytes = sizeof(glm::vec3) + 3 * sizeof(glm::dvec3) + 7 * sizeof(uint32_t);
   builder.budget().charge(file, count, kSoupBytes);
   soup.positions.reserve(size_t{3} * count);
   soup.corners.reserve(size_t{3} * count);
   soup.corner_normals.reserve(size_t{3} * count);
   soup.normals.reserve(count);
   soup.face_ends.reserve(count);
+  bool attributes = false;
   for (size_t i = 0; i < count; ++i) {
     glm::vec3 vectors[4];
     std::memcpy(vectors, bytes.data() + kHeaderBytes + i * kTriangleBytes, sizeof vectors);
     for (int k = 1; k < 4; ++k) {
       soup.corners.push_back(uint32_t(soup.positions.size()));
-      soup.positions.push_back(vectors[k]);
+      soup.positions.push_back(glm::dvec3(vectors[k]));
       soup.corner_normals.push_back(uint32_t(i));
     }
     soup.normals.push_back(vectors[0]);
     soup.end_face(file, builder.budget());
+    const char* attribute = bytes.data() + kHeaderBytes + i * kTriangleBytes + sizeof vectors;
+    attributes = attributes || attribute[0] || attribute[1];
   }
+  if (attributes)
+    builder.note(file + ": attribute bytes of triangles (colours, in some programs) are not read");
 }
 
-glm::vec3 read_vector(std::string_view line) {
-  glm::vec3 vector(std::numeric_limits<float>::quiet_NaN());
+glm::dvec3 read_vector(std::string_view line) {
+  glm::dvec3 vector(std::numeric_limits<double>::quiet_NaN());
   std::string_view word;
-  for (int i = 0; i < 3 && take_word(line, word); ++i) vector[i] = float(number_of(word));
+  for (int i = 0; i < 3 && take_word(line, word); ++i) vector[i] = number_of(word);
   return vector;
 }
 
@@ -76,7 +124,7 @@ void read_ascii(const std::string& file, std::string_view text, PolygonSoup& sou
     } else if (equals_ignoring_case(word, "facet")) {
       normal = uint32_t(soup.normals.size());
       take_word(line, word);  // "normal"
-      budget.push_back(file, soup.normals, read_vector(line));
+      budget.push_back(file, soup.normals, glm::vec3(read_vector(line)));
     } else if (equals_ignoring_case(word, "endfacet")) {
       soup.end_face(file, budget);
       normal = kNoIndex;
@@ -95,22 +143,16 @@ void read_stl(const std::filesystem::path& path, MeshBuilder& builder) {
   PolygonSoup soup;
   soup.material = builder.default_material();
   const bool has_header = bytes.size() >= kHeaderBytes;
-  const uint64_t fits = has_header ? (bytes.size() - kHeaderBytes) / kTriangleBytes : 0;
-  const uint32_t count = has_header ? binary_count(bytes) : 0;
-  if (has_header && bytes.size() == kHeaderBytes + kTriangleBytes * uint64_t{count}) {
-    read_binary(file, bytes, count, soup, builder);
-  } else if (looks_ascii(bytes)) {
+  const bool fits =
+      has_header && bytes.size() == kHeaderBytes + kTriangleBytes * uint64_t{binary_count(bytes)};
+  if (!fits && looks_ascii(bytes)) {
     const std::string text = read_text(path, builder.budget());
     read_ascii(file, text, soup, builder);
-  } else if (has_header && count <= fits) {
-    builder.note(file + ": bytes after the last triangle are not used");
-    read_binary(file, bytes, count, soup, builder);
+  } else if (has_header) {
+    read_binary(file, bytes, count_triangles(file, bytes, builder), soup, builder);
   } else {
     throw Failure(Exit::kInvalid, file,
-                  has_header
-                      ? "declares " + std::to_string(count) + " triangles and has bytes for " +
-                            std::to_string(fits) + ", it is cut short or no STL file: export or copy it again"
-                      : "is no STL file, neither text nor long enough for a header: export it again");
+                  "is no STL file, neither text nor long enough for a header: export it again");
   }
   add_polygons(file, soup, builder);
 }

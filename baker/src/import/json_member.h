@@ -1,0 +1,46 @@
+// Reading JSON whose shape nobody has checked.
+#pragma once
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <string>
+
+namespace lsp {
+
+// The member of an object, or null; never throws whatever `parent` is.
+inline const nlohmann::json& member(const nlohmann::json& parent, const char* key) {
+  static const nlohmann::json kNull;
+  if (!parent.is_object()) return kNull;
+  const auto at = parent.find(key);
+  return at != parent.end() ? *at : kNull;
+}
+
+// A whole number of 0 or more, or `fallback` for anything else.
+inline int64_t index_member(const nlohmann::json& parent, const char* key, int64_t fallback = -1) {
+  const nlohmann::json& value = member(parent, key);
+  if (!value.is_number()) return fallback;
+  const auto number = value.get<double>();
+  return number >= 0 && number < 9e15 && number == std::floor(number) ? int64_t(number) : fallback;
+}
+
+inline double number_member(const nlohmann::json& parent, const char* key, double fallback) {
+  const nlohmann::json& value = member(parent, key);
+  return value.is_number() ? value.get<double>() : fallback;
+}
+
+inline std::string text_member(const nlohmann::json& parent, const char* key) {
+  const nlohmann::json& value = member(parent, key);
+  return value.is_string() ? value.get<std::string>() : std::string();
+}
+
+// Overwrites the first `count` of `values` by an array's numbers; an array of another length changes nothing.
+template <typename T>
+void numbers_member(const nlohmann::json& parent, const char* key, size_t count, T* values) {
+  const nlohmann::json& array = member(parent, key);
+  if (!array.is_array() || array.size() != count) return;
+  for (size_t i = 0; i < count; ++i) {
+    if (array[i].is_number()) values[i] = T(array[i].template get<double>());
+  }
+}
+
+}  // namespace lsp

@@ -1,0 +1,120 @@
+#include "import/mtl_textures.h"
+
+#include <algorithm>
+
+#include "import/source_file.h"
+#include "lsp/program.h"
+
+namespace lsp {
+namespace {
+
+// All that decides a texture, in one text.
+std::string key_of(const MtlMaterial& source, const MtlMap& map) {
+  std::string key = (source.folder / map.file).string() + '\0' + map.channel + (map.clamp ? 'c' : 'r');
+  for (const double value : {map.scale.x, map.scale.y, map.offset.x, map.offset.y})
+    key += ' ' + std::to_string(value);
+  return key;
+}
+
+// Puts the opacity map's values, at the nearest texel, where the colour map's alpha is. The result has the
+// size of the larger of both.
+Picture with_alpha(const Picture& color, const Picture& opacity, char channel) {
+  Picture out;
+  out.width = std::max(color.width, opacity.width);
+  out.height = std::max(color.height, opacity.height);
+  out.has_alpha = true;
+  out.rgba.resize(size_t{out.width} * out.height * 4, 255);
+  const auto texel = [&](const Picture& from, uint32_t x, uint32_t y) {
+    const uint64_t column = uint64_t{x} * from.width / out.width,
+                   row = uint64_t{y} * from.height / out.height;
+    return &from.rgba[(row * from.width + column) * 4];
+  };
+  if (!channel) channel = opacity.has_alpha ? 'm' : 'l';
+  for (uint32_t y = 0; y < out.height; ++y) {
+    for (uint32_t x = 0; x < out.width; ++x) {
+      uint8_t* to = &out.rgba[(size_t{y} * out.width + x) * 4];
+      if (!color.rgba.empty()) std::copy_n(texel(color, x, y), 3, to);
+      const uint8_t* from = texel(opacity, x, y);
+      to[3] = channel == 'r'   ? from[0]
+              : channel == 'g' ? from[1]
+              : channel == 'b' ? from[2]
+              : channel == 'm' ? from[3]
+                               : uint8_t((from[0] * 2126 + from[1] * 7152 + from[2] * 722 + 5000) / 10000);
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+uint32_t MtlTextures::add(const MtlMaterial& source, std::map<uint32_t, Surface>& surfaces) {
+  const uint32_t id = builder_.add_material(source.material);
+  if (source.color.file.empty() && source.emission.file.empty() && source.opacity.file.empty()) return id;
+  const Material& material = builder_.mesh().materials[id];
+  Surface surface{material.base_color, material.emission, {AlphaMode::kBlend, material.opacity}, {}, {}};
+  const bool masked = !source.opacity.file.empty();
+  if (!masked && material.opacity == 1) surface.alpha.mode = AlphaMode::kOpaque;
+
+  const auto [base, fresh] = known_.try_emplace(
+      key_of(source, source.color) + key_of(source, source.opacity) + std::to_string(material.opacity));
+  if (fresh) {
+    Picture color = read(source, source.color);
+    // Colour and opacity are one texture; the alpha of a colour map says nothing (map_d does).
+    if (!masked) {
+      if (color.has_alpha)
+        builder_.note(file_ + ": the alpha of map_Kd is not read, map_d would say what is solid");
+      for (size_t i = 3; i < color.rgba.size(); i += 4) color.rgba[i] = 255;
+    } else if (const Picture opacity = read(source, source.opacity); !opacity.rgba.empty()) {
+      const uint64_t texels =
+          uint64_t{std::max(color.width, opacity.width)} * std::max(color.height, opacity.height);
+      builder_.budget().charge(file_, texels, 4);
+      color = with_alpha(color, opacity, source.opacity.channel);
+    }
+    base->second =
+        use(source.color.file.empty() ? source.opacity : source.color, std::move(color), surface.alpha);
+  }
+  surface.base = base->second;
+  if (!source.emission.file.empty() && material.emission != glm::vec3(0)) {
+    const auto [glow, unseen] = known_.try_emplace("glow " + key_of(source, source.emission));
+    if (unseen) glow->second = use(source.emission, read(source, source.emission), {});
+    surface.glow = glow->second;
+  }
+  if (surface.has_textures()) surfaces[id] = surface;
+  return id;
+}
+
+// Empty, with a note, where it cannot be had.
+Picture MtlTextures::read(const MtlMaterial& source, const MtlMap& map) {
+  Picture picture;
+  if (map.file.empty() || map.file.find('\0') != map.file.npos) return picture;
+  std::string name = map.file;
+  std::replace(name.begin(), name.end(), '\\', '/');
+  std::string why = "is not there";
+  // Exporters write the path on their own machine; the file itself is usually beside the library.
+  for (const auto& path : {source.folder / name, source.folder / std::filesystem::path(name).filename()}) {
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(path, error)) continue;
+    const std::string bytes = read_file(path, builder_.budget());
+    builder_.add_source(path);
+    picture = decode_picture(file_, bytes, builder_.budget(), why);
+    builder_.budget().release(bytes.size());
+    break;
+  }
+  if (picture.rgba.empty())
+    builder_.note(file_ + ": the picture " + map.file + " " + why + "; factors hold without it");
+  return picture;
+}
+
+TextureUse MtlTextures::use(const MtlMap& map, Picture picture, const AlphaRule& rule) {
+  TextureUse use;
+  if (picture.rgba.empty()) return use;
+  builder_.budget().charge(file_, picture.rgba.size(), 7);
+  use.texture = std::make_shared<Texture>(std::move(picture), rule);
+  use.wrap_x = use.wrap_y = map.clamp ? Wrap::kClamp : Wrap::kRepeat;
+  // In OBJ v grows upwards: v' = 1 - (scale * (1 - v) + offset).
+  use.linear = glm::dmat2(map.scale.x, 0, 0, map.scale.y);
+  use.offset = {map.offset.x, 1 - map.scale.y - map.offset.y};
+  return use;
+}
+
+}  // namespace lsp

@@ -1,0 +1,30 @@
+// From double to single precision, about an origin where that is needed.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "mesh.h"
+
+namespace lsp {
+
+// The nearest position in single precision. Not a conversion in place: GCC 12 leaves out that of a vector
+// from double to float and back where it sees both.
+glm::vec3 rounded(const glm::dvec3& p);
+
+// What hashes of positions are keyed with: whoever writes a mesh cannot know which of them collide.
+uint64_t hash_key();
+
+// Zero, unless rounding to float32 would move a position by more than 1e-6 of the scene's longest side: then
+// the middle of the scene, rounded to a step that positions near it have in double precision too.
+glm::dvec3 choose_origin(const std::vector<glm::dvec3>& exact);
+
+// Fills mesh.positions with `exact` less mesh.origin, welds what became equal, and takes out triangles that
+// have no area any more (counted as collapsed).
+void round_positions(const std::vector<glm::dvec3>& exact, Mesh& mesh);
+
+// Two equal corners, or an area below 1e-14 of the longest edge squared.
+bool is_degenerate(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c);
+
+}  // namespace lsp

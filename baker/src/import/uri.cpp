@@ -1,0 +1,76 @@
+#include "import/uri.h"
+
+#include <algorithm>
+
+#include "lsp/program.h"
+
+namespace lsp {
+namespace {
+
+std::string decode_percent(std::string_view text) {
+  const auto digit = [](char c) {
+    return c >= '0' && c <= '9'   ? c - '0'
+           : c >= 'a' && c <= 'f' ? c - 'a' + 10
+           : c >= 'A' && c <= 'F' ? c - 'A' + 10
+                                  : -1;
+  };
+  std::string out;
+  for (size_t i = 0; i < text.size(); ++i) {
+    if (text[i] == '%' && i + 2 < text.size() && digit(text[i + 1]) >= 0 && digit(text[i + 2]) >= 0) {
+      out += char(digit(text[i + 1]) * 16 + digit(text[i + 2]));
+      i += 2;
+    } else {
+      out += text[i];
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+std::string decode_data_uri(const std::string& file, std::string_view uri) {
+  const auto fail = [&] {
+    return Failure(Exit::kInvalid, file, "has a data URI that is not base64, export it again");
+  };
+  const size_t comma = uri.find(',');
+  if (comma == uri.npos || uri.substr(0, comma).find(";base64") == uri.npos) throw fail();
+  std::string out;
+  out.reserve((uri.size() - comma) / 4 * 3);
+  uint32_t bits = 0;
+  int held = 0;
+  for (const char c : uri.substr(comma + 1)) {
+    int value = -1;
+    if (c >= 'A' && c <= 'Z') value = c - 'A';
+    if (c >= 'a' && c <= 'z') value = c - 'a' + 26;
+    if (c >= '0' && c <= '9') value = c - '0' + 52;
+    if (c == '+' || c == '-') value = 62;
+    if (c == '/' || c == '_') value = 63;
+    if (c == '=') break;
+    if (value < 0) throw fail();
+    bits = bits << 6 | uint32_t(value);
+    held += 6;
+    if (held >= 8) out += char(bits >> (held -= 8));
+  }
+  return out;
+}
+
+std::filesystem::path resolve_uri(const std::filesystem::path& document, std::string_view uri, bool& odd) {
+  const std::string decoded = decode_percent(uri);
+  if (decoded.find('\0') != decoded.npos) {
+    throw Failure(Exit::kInvalid, document.string(),
+                  "names a file with a zero byte in its name, export it again");
+  }
+  std::string slashes = decoded;
+  std::replace(slashes.begin(), slashes.end(), '\\', '/');
+  odd = false;
+  const std::filesystem::path folder = document.parent_path();
+  for (const std::string& name : {decoded, std::string(uri), slashes}) {
+    std::error_code error;
+    odd = name != decoded;
+    if (std::filesystem::is_regular_file(folder / name, error)) return folder / name;
+  }
+  odd = false;
+  return folder / decoded;
+}
+
+}  // namespace lsp
