@@ -1,17 +1,17 @@
-// The loops over rays, for a struct that holds the text of lsp/traverse.h (trace_bvh.cpp, trace_ntree.cpp) and knows
-// what to fetch of a leaf.
+// The loops over rays, for a struct that holds the text of lsp/traverse.h (trace_bvh.cpp, trace_ntree.cpp)
+// and knows what to fetch of a leaf.
 //
-// Approximate rays are traced in groups, so that what one waits for is fetched while the others work (Chen, Ailamaki,
-// Gibbons, Mowry, "Improving Hash Join Performance through Prefetching", 2004: group prefetching). A ray goes
-// down the tree to something to test, asks for it and lets the next one go on; a look-up, four loads that
-// depend on one another, is done a load at a time for all rays that are at one. The steps are those of
-// lsp_trace_ready, ray by ray in the same order: the same bits.
+// Approximate rays are traced in groups, so that what one waits for is fetched while the others work (Chen,
+// Ailamaki, Gibbons, Mowry, "Improving Hash Join Performance through Prefetching", 2004: group prefetching).
+// A ray goes down the tree to something to test, asks for it and lets the next one go on; a look-up, four
+// loads that depend on one another, is done a load at a time for all rays that are at one. The steps are
+// those of lsp_trace_ready, ray by ray in the same order: the same bits.
 //
 // Approximate rays on five meshes are 1.3 to 2.1 times as fast as one after the other in shuffled order, 1.0
 // to 1.4 times in order. With 32 rays a group it is the same, with 8 less.
 //
-// Exact rays go one after the other. In groups they were, on five meshes, 0.87 to 1.06 times as fast in order and 0.97
-// to 1.2 times shuffled in a BVH, in an NTree 0.8 to 1.0 times.
+// Exact rays go one after the other. In groups they were, on five meshes, 0.87 to 1.06 times as fast in order
+// and 0.97 to 1.2 times shuffled in a BVH, in an NTree 0.8 to 1.0 times.
 #pragma once
 
 #include <utility>
@@ -19,11 +19,11 @@
 #include "trace_loops.h"
 #include "trace_subset.h"
 
-// Compiled for each of these instruction sets, chosen when the program is loaded; nothing is contracted, so that all
-// give the same bits. What they bring are registers, population counts and three operands: with AVX-512 1.09 to 1.23
-// times as fast on five meshes, exact and approximate. (Boxes tested four wide with intrinsics were slower, one
-// function with all ten loops by a third.) Not in clang, which takes no address of a template's clones, and not
-// under a sanitizer, whose run time is not up yet when the loader chooses.
+// Compiled for each of these instruction sets, chosen when the program is loaded; nothing is contracted, so
+// that all give the same bits. What they bring are registers, population counts and three operands: with
+// AVX-512 1.09 to 1.23 times as fast on five meshes, exact and approximate. (Boxes tested four wide with
+// intrinsics were slower, one function with all ten loops by a third.) Not in clang, which takes no address
+// of a template's clones, and not under a sanitizer, whose run time is not up yet when the loader chooses.
 #if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__)
 #define LSP_CLONES __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
 #else
@@ -32,12 +32,12 @@
 
 namespace lsp {
 
-// The few rays from far away have code of their own: without them the other's is 1.07 to 1.12 times as fast. A shader
-// has one loop, for a device may run both.
+// The few rays from far away have code of their own: without them the other's is 1.07 to 1.12 times as fast.
+// A shader has one loop, for a device may run both.
 template <class Traversal, uint32_t kFlags>
 __attribute__((noinline)) typename Traversal::LspTraced trace_far(const lsp_scene& scene,
-                                                                  const typename Traversal::LspSetup& s, float lod,
-                                                                  const LspRay& ray) {
+                                                                  const typename Traversal::LspSetup& s,
+                                                                  float lod, const LspRay& ray) {
   Traversal traversal;
   return traversal.lsp_trace_ready(scene, s, {kFlags, lod, true}, ray);
 }
@@ -54,14 +54,15 @@ LSP_INLINE inline void add(lsp_trace_counts* sums, const Traced& traced) {
 }
 
 template <class Traversal, uint32_t kFlags>
-LSP_CLONES void trace_singly(const lsp_scene& scene, float lod, const LspRay* rays, LspHit* hits, uint64_t count,
-                             lsp_trace_counts* counts) {
+LSP_CLONES void trace_singly(const lsp_scene& scene, float lod, const LspRay* rays, LspHit* hits,
+                             uint64_t count, lsp_trace_counts* counts) {
   Traversal traversal;
   for (uint64_t i = 0; i < count; ++i) {
     const typename Traversal::LspSetup s = Traversal::lsp_setup(scene, rays[i]);
-    const auto traced = !s.valid                          ? Traversal::lsp_invalid_ray()
-                        : Traversal::lsp_is_far(scene, s) ? trace_far<Traversal, kFlags>(scene, s, lod, rays[i])
-                                                          : traversal.lsp_trace_ready(scene, s, {kFlags, lod, false}, rays[i]);
+    const auto traced = !s.valid ? Traversal::lsp_invalid_ray()
+                        : Traversal::lsp_is_far(scene, s)
+                            ? trace_far<Traversal, kFlags>(scene, s, lod, rays[i])
+                            : traversal.lsp_trace_ready(scene, s, {kFlags, lod, false}, rays[i]);
     hits[i] = traced.hit;
     add(counts, traced);
   }
@@ -79,14 +80,47 @@ struct Waiting : Traversal {
   LSP_INLINE const LspLineSpace& line_space(const lsp_scene& scene) const {
     return subset::lsp_load_line_space(scene, Traversal::lsp_line_space_index(this->lsp_walk.ref));
   }
+
+  // To what the ray waits for next, and asks for it.
+  LSP_INLINE void advance(const lsp_scene& scene, const typename Traversal::LspQuery& q) {
+    this->lsp_advance(scene, s, q);
+    const uint32_t ref = this->lsp_walk.ref, hit = this->lsp_walk.best.triangle;
+    if (ref == LSP_NONE) {
+      if (hit == LSP_NONE) return;
+      subset::fetch(scene.triangles, hit);
+      if (scene.normals != nullptr) subset::fetch(scene.normals, hit);
+    } else if ((ref & LSP_LEAF_BIT) != 0u) {
+      this->fetch_leaf(scene);
+    } else {
+      subset::fetch(scene.line_spaces, Traversal::lsp_line_space_index(ref));
+    }
+  }
+
+  // The stages of a look-up; each asks for what the next one reads.
+  LSP_INLINE void find_shaft(const lsp_scene& scene, const typename Traversal::LspQuery& q) {
+    const LspLineSpace& ls = line_space(scene);
+    pass = this->lsp_find_shaft(s, q, ls);
+    subset::fetch(scene.bit_words, ls.word_first + (pass.shaft >> 5u));
+  }
+  LSP_INLINE void find_entry(const lsp_scene& scene, const typename Traversal::LspQuery& q) {
+    const LspLineSpace& ls = line_space(scene);
+    entry = this->lsp_find_entry(scene, q, ls, pass);
+    subset::fetch(scene.candidates, ls.candidate_first + (entry >> Traversal::lsp_entry_pack(ls)));
+  }
+  LSP_INLINE void find_candidate(const lsp_scene& scene) {
+    candidate = Traversal::lsp_candidate(scene, line_space(scene), entry);
+    subset::fetch(scene.triangles, candidate);
+  }
+  LSP_INLINE void answer(const lsp_scene& scene, const typename Traversal::LspQuery& q) {
+    this->lsp_answer(scene, s, q, line_space(scene), pass, candidate);
+  }
 };
 
 constexpr uint32_t kGroup = 16;
 
 template <class Traversal, uint32_t kFlags>
-LSP_CLONES void trace_group(const lsp_scene& scene, float lod, const LspRay* rays, LspHit* hits, uint64_t count,
-                            lsp_trace_counts* counts) {
-  using subset::fetch;
+LSP_CLONES void trace_group(const lsp_scene& scene, float lod, const LspRay* rays, LspHit* hits,
+                            uint64_t count, lsp_trace_counts* counts) {
   using Ray = Waiting<Traversal>;
   const typename Traversal::LspQuery q{kFlags, lod, false};
   Ray group[kGroup];
@@ -124,56 +158,29 @@ LSP_CLONES void trace_group(const lsp_scene& scene, float lod, const LspRay* ray
     uint32_t leaf_count = 0, look_up_count = 0, done_count = 0;
     for (uint32_t i = 0; i < on_count; ++i) {
       Ray& r = group[on[i]];
-      r.lsp_advance(scene, r.s, q);
-      if (r.lsp_walk.ref == LSP_NONE) {
+      r.advance(scene, q);
+      if (r.lsp_walk.ref == LSP_NONE)
         done[done_count++] = on[i];
-        if (r.lsp_walk.best.triangle != LSP_NONE) {
-          fetch(scene.triangles, r.lsp_walk.best.triangle);
-          if (scene.normals != nullptr) fetch(scene.normals, r.lsp_walk.best.triangle);
-        }
-      } else if ((r.lsp_walk.ref & LSP_LEAF_BIT) != 0u) {
+      else if ((r.lsp_walk.ref & LSP_LEAF_BIT) != 0u)
         leaves[leaf_count++] = on[i];
-        r.fetch_leaf(scene);
-      } else {
+      else
         look_ups[look_up_count++] = on[i];
-        fetch(scene.line_spaces, Traversal::lsp_line_space_index(r.lsp_walk.ref));
-      }
     }
-    for (uint32_t i = 0; i < look_up_count; ++i) {
-      Ray& r = group[look_ups[i]];
-      const LspLineSpace& ls = r.line_space(scene);
-      r.pass = r.lsp_find_shaft(r.s, q, ls);
-      fetch(scene.bit_words, ls.word_first + (r.pass.shaft >> 5u));
-    }
-    for (uint32_t i = 0; i < leaf_count; ++i) {
-      Ray& r = group[leaves[i]];
-      r.fetch_triangles(scene);
-    }
+    for (uint32_t i = 0; i < look_up_count; ++i) group[look_ups[i]].find_shaft(scene, q);
+    for (uint32_t i = 0; i < leaf_count; ++i) group[leaves[i]].fetch_triangles(scene);
     on_count = 0;
     for (uint32_t i = 0; i < done_count; ++i) {
-      Ray& r = group[done[i]];
-      end(r);
-      if (begin(r)) on[on_count++] = done[i];
+      end(group[done[i]]);
+      if (begin(group[done[i]])) on[on_count++] = done[i];
     }
-    for (uint32_t i = 0; i < look_up_count; ++i) {
-      Ray& r = group[look_ups[i]];
-      const LspLineSpace& ls = r.line_space(scene);
-      r.entry = r.lsp_find_entry(scene, q, ls, r.pass);
-      fetch(scene.candidates, ls.candidate_first + (r.entry >> Traversal::lsp_entry_pack(ls)));
-    }
+    for (uint32_t i = 0; i < look_up_count; ++i) group[look_ups[i]].find_entry(scene, q);
     for (uint32_t i = 0; i < leaf_count; ++i) {
-      Ray& r = group[leaves[i]];
-      r.lsp_test_leaf(scene, r.s);
+      group[leaves[i]].lsp_test_leaf(scene, group[leaves[i]].s);
       on[on_count++] = leaves[i];
     }
+    for (uint32_t i = 0; i < look_up_count; ++i) group[look_ups[i]].find_candidate(scene);
     for (uint32_t i = 0; i < look_up_count; ++i) {
-      Ray& r = group[look_ups[i]];
-      r.candidate = Traversal::lsp_candidate(scene, r.line_space(scene), r.entry);
-      fetch(scene.triangles, r.candidate);
-    }
-    for (uint32_t i = 0; i < look_up_count; ++i) {
-      Ray& r = group[look_ups[i]];
-      r.lsp_answer(scene, r.s, q, r.line_space(scene), r.pass, r.candidate);
+      group[look_ups[i]].answer(scene, q);
       on[on_count++] = look_ups[i];
     }
   }

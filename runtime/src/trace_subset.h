@@ -1,8 +1,8 @@
-// Makes C++ read lsp/traverse.h: the GLSL names it uses, and access to a scene's arrays. The text is then included in
-// a struct within a namespace that uses lsp::subset.
+// Makes C++ read lsp/traverse.h: the GLSL names it uses, and access to a scene's arrays. The text is then
+// included in a struct within a namespace that uses lsp::subset.
 //
-// Every array access is checked against the header's counts, which lsp_open has checked against the file: a bad index
-// reads a zero element.
+// Every array access is checked against the header's counts, which lsp_open has checked against the file: a
+// bad index reads a zero element.
 #pragma once
 
 #include <bit>
@@ -50,7 +50,9 @@ LSP_INLINE inline const T& at(const T* array, uint index, uint count) {
 
 LSP_INLINE inline const LspHeader& lsp_load_header(LspScene scene) { return *scene.header; }
 LSP_INLINE inline bool lsp_has_normals(LspScene scene) { return scene.normals != nullptr; }
-LSP_INLINE inline const LspNode& lsp_load_node(LspScene scene, uint i) { return at(scene.nodes, i, scene.header->node_count); }
+LSP_INLINE inline const LspNode& lsp_load_node(LspScene scene, uint i) {
+  return at(scene.nodes, i, scene.header->node_count);
+}
 LSP_INLINE inline const LspTriangle& lsp_load_triangle(LspScene scene, uint i) {
   return at(scene.triangles, i, scene.header->triangle_count);
 }
@@ -69,7 +71,9 @@ LSP_INLINE inline uint lsp_load_candidate(LspScene scene, uint i) {
 LSP_INLINE inline const LspBitWord& lsp_load_grid(LspScene scene, uint i) {
   return at(scene.grid, i, scene.header->node_count * LSP_GRID_WORDS(scene.header->ntree_branching));
 }
-LSP_INLINE inline const LspCell& lsp_load_cell(LspScene scene, uint i) { return at(scene.cells, i, scene.header->cell_count); }
+LSP_INLINE inline const LspCell& lsp_load_cell(LspScene scene, uint i) {
+  return at(scene.cells, i, scene.header->cell_count);
+}
 LSP_INLINE inline uint lsp_load_reference(LspScene scene, uint i) {
   return at(scene.references, i, scene.header->reference_count);
 }

@@ -91,15 +91,17 @@ LSP_STEP LspNext lsp_pop_where_none(LspNext next, float best_t) {
   return next;
 }
 
-/* Steps that a ray takes at most: what max_steps counts and, where they are asked, the Line Spaces it begins in. */
+/* Steps that a ray takes at most: what max_steps counts and, where they are asked, the Line Spaces it begins
+ * in. */
 LSP_FN uint lsp_most_steps(LspScene scene, LspQuery q) {
   uint asked = (q.flags & LSP_TRACE_NEAR_SKIP) != 0u ? lsp_load_header(scene).line_space_count : 0u;
   return lsp_load_header(scene).max_steps + asked;
 }
 
-/* Down to the next leaf or Line Space; LSP_NONE: there is none. Where invocations run in step, those that have found
- * one wait for the others, and no step pays for both (Aila, Laine, "Understanding the Efficiency of Ray Traversal on
- * GPUs", 2009: while-while). On lavapipe 1.4 to 1.9 times as fast as a step of either kind. */
+/* Down to the next leaf or Line Space; LSP_NONE: there is none. Where invocations run in step, those that
+ * have found one wait for the others, and no step pays for both (Aila, Laine, "Understanding the Efficiency
+ * of Ray Traversal on GPUs", 2009: while-while). On lavapipe 1.4 to 1.9 times as fast as a step of either
+ * kind. */
 LSP_STEP void lsp_advance(LspScene scene, LspSetup s, LspQuery q) {
   bool found = (q.flags & LSP_TRACE_ANY_HIT) != 0u && lsp_walk.best.triangle != LSP_NONE;
   float best_t = lsp_walk.best.t;

@@ -1,5 +1,5 @@
-/* What the program and its shaders tell one another, stated once, for C, C++ and GLSL: rays and hits, what is asked of
- * a trace, and where the trace shader finds its buffers and numbers. */
+/* What the program and its shaders tell one another, stated once, for C, C++ and GLSL: rays and hits, what
+ * is asked of a trace, and where the trace shader finds its buffers and numbers. */
 #ifndef LSP_INTERFACE_H
 #define LSP_INTERFACE_H
 
@@ -25,30 +25,31 @@ LSP_END(LspHit)
 #define LSP_HIT_LINE_SPACE 0x1u    /* answered by a Line Space */
 #define LSP_HIT_ORIGIN_INSIDE 0x2u /* the origin lies inside that Line Space's node */
 
-/* The traversal ended with work left, the answer is not to be trusted. In the library this only happens to files whose
- * declared bounds are wrong; on a device also where it cuts long loops short (some give a vector of invocations a
- * budget of iterations). */
+/* The traversal ended with work left, the answer is not to be trusted. In the library this only happens to
+ * files whose declared bounds are wrong; on a device also where it cuts long loops short (some give a
+ * vector of invocations a budget of iterations). */
 #define LSP_HIT_INCOMPLETE 0x80000000u
 
-/* ---- what is asked of a trace --------------------------------------------------------------------------- */
+/* ---- what is asked of a trace -------------------------------------------------------------------------- */
 
 #define LSP_TRACE_APPROXIMATE 0x1u      /* stop at Line Spaces; without it: exact, down to triangles */
 #define LSP_TRACE_ANY_HIT 0x2u          /* any hit in (tmin, tmax), not the closest */
 #define LSP_TRACE_NEAR_APPROXIMATE 0x4u /* answer from a Line Space even where the origin lies inside it */
 
-/* Where the origin lies inside a Line Space: first ask the shaft of the opposite direction for the last surface
- * on the ray's line, and trace exactly only when that lies ahead. Saves most of the exact work near the origin
- * for a small error; ignored with LSP_TRACE_NEAR_APPROXIMATE. */
+/* Where the origin lies inside a Line Space: first ask the shaft of the opposite direction for the last
+ * surface on the ray's line, and trace exactly only when that lies ahead. Saves most of the exact work near
+ * the origin for a small error; ignored with LSP_TRACE_NEAR_APPROXIMATE. */
 #define LSP_TRACE_NEAR_SKIP 0x8u
 
-/* Exact traces: ask conservative Line Spaces (lsp-bake --conservative) first, and leave out a node whose shaft is
- * proven empty. The answers are the same to the bit, any hit's too; fewer nodes are visited, for a look-up at every
- * Line Space passed. Does nothing in approximate traces, in files without such Line Spaces, and for rays that begin
- * further than about two extents from the scene, whose rounding the Line Spaces do not cover. */
+/* Exact traces: ask conservative Line Spaces (lsp-bake --conservative) first, and leave out a node whose
+ * shaft is proven empty. The answers are the same to the bit, any hit's too; fewer nodes are visited, for a
+ * look-up at every Line Space passed. Does nothing in approximate traces, in files without such Line
+ * Spaces, and for rays that begin further than about two extents from the scene, whose rounding the Line
+ * Spaces do not cover. */
 #define LSP_TRACE_SKIP_EMPTY 0x10u
 #define LSP_TRACE_ALL_FLAGS 0x1Fu
 
-/* ---- the trace shader ----------------------------------------------------------------------------------- */
+/* ---- the trace shader ---------------------------------------------------------------------------------- */
 
 /* Bindings of its descriptor set, all storage buffers; 0 to 8 are those of lsp.glsl. */
 #define LSP_BINDING_HEADER 0
@@ -72,9 +73,9 @@ LSP_END(LspHit)
 /* Rays of a work group, one an invocation. */
 #define LSP_VULKAN_GROUP_SIZE 64
 
-/* Specialization constants of the shader, each a uint32_t. Stack: its entries, at least header->max_stack and
- * 1, default 96. Flags: LSP_TRACE_*, default 0; a pipeline does one kind of trace. Parts: what the scene needs of
- * the shader, of several scenes all that any of them needs; default everything. */
+/* Specialization constants of the shader, each a uint32_t. Stack: its entries, at least header->max_stack
+ * and 1, default 96. Flags: LSP_TRACE_*, default 0; a pipeline does one kind of trace. Parts: what the
+ * scene needs of the shader, of several scenes all that any of them needs; default everything. */
 #define LSP_VULKAN_STACK_CONSTANT 0
 #define LSP_VULKAN_FLAGS_CONSTANT 1
 #define LSP_VULKAN_PARTS_CONSTANT 2

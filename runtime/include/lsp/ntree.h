@@ -1,16 +1,16 @@
-/* Traversal of an NTree, in the common subset of GLSL 4.6 and C++20; lsp/traverse.h includes it where LSP_NTREE
- * is defined. Layout: LspCell in layout.h.
+/* Traversal of an NTree, in the common subset of GLSL 4.6 and C++20; lsp/traverse.h includes it where
+ * LSP_NTREE is defined. Layout: LspCell in layout.h.
  *
  * A three-dimensional digital differential analyser in every node (Amanatides, Woo, "A Fast Voxel Traversal
  * Algorithm for Ray Tracing", 1987) that computes the next planes from the cell's integer coordinates, not by
  * adding steps: errors do not add up, and neighbours agree on the plane between them to the bit.
  *
- * No gaps at borders. The cells visited cover the ray up to the rounding of the planes, of the t at which they are
- * crossed, and of the point at which a child node is entered: an error along the axes of at most
- * err = 16 u R + 4 u max|o| (lsp/traverse.h). Where a corner is cut, the cell passed over touches two visited ones
- * in a sliver narrower than err. A cell holds every triangle within ntree_margin of it; while err <= ntree_margin
- * that is the sliver's triangles too. A ray from further away visits all filled cells whose box, grown by err, it
- * hits, in the order of storage.
+ * No gaps at borders. The cells visited cover the ray up to the rounding of the planes, of the t at which
+ * they are crossed, and of the point at which a child node is entered: an error along the axes of at most err
+ * = 16 u R + 4 u max|o| (lsp/traverse.h). Where a corner is cut, the cell passed over touches two visited
+ * ones in a sliver narrower than err. A cell holds every triangle within ntree_margin of it; while err <=
+ * ntree_margin that is the sliver's triangles too. A ray from further away visits all filled cells whose box,
+ * grown by err, it hits, in the order of storage.
  */
 
 LSP_FN vec3 lsp_ntree_lo(LspScene scene, ivec3 cell, float size) {
@@ -58,11 +58,12 @@ LSP_FN uint lsp_ntree_next_filled(LspScene scene, uint first_word, uint cell, ui
   return cells;
 }
 
-/* g / n of coordinates that are not negative. Integers are divided slowly, on some devices an invocation after the
- * other. (g + 1/2) / n is at least 1 / 2n >= 1/32 away from the next integer; with g < 16^4 rounding moves it by
- * less than 1/64. */
+/* g / n of coordinates that are not negative. Integers are divided slowly, on some devices an invocation
+ * after the other. (g + 1/2) / n is at least 1 / 2n >= 1/32 away from the next integer; with g < 16^4
+ * rounding moves it by less than 1/64. */
 LSP_FN ivec3 lsp_ntree_divide(ivec3 g, float per_n) {
-  return ivec3(int((float(g.x) + 0.5f) * per_n), int((float(g.y) + 0.5f) * per_n), int((float(g.z) + 0.5f) * per_n));
+  return ivec3(int((float(g.x) + 0.5f) * per_n), int((float(g.y) + 0.5f) * per_n),
+               int((float(g.z) + 0.5f) * per_n));
 }
 
 /* Nodes left for a child: of one at `depth` entry depth + 1. */
@@ -71,8 +72,8 @@ uint lsp_parents[LSP_MAX_NTREE_DEPTH + 1u];
 /* How far the ray has come. */
 struct LspWalk {
   LspBest best;
-  uint ref;     /* what is to be visited or was found; LSP_NONE: nothing */
-  uint count;   /* of a leaf's references */
+  uint ref;   /* what is to be visited or was found; LSP_NONE: nothing */
+  uint count; /* of a leaf's references */
   uint node;
   uint depth;   /* of the node, the root's being 0; LSP_NONE: above the root, whose one cell it is */
   ivec3 base;   /* first cell of the node */
@@ -126,7 +127,8 @@ LSP_STEP void lsp_ntree_look(LspScene scene, LspSetup s, LspQuery q) {
   lsp_walk.count = 0u;
   lsp_walk.ref = LSP_NONE;
   uint index = lsp_ntree_index(scene);
-  LspBitWord word = lsp_load_grid(scene, lsp_walk.node * LSP_GRID_WORDS(lsp_load_header(scene).ntree_branching) + (index >> 5u));
+  LspBitWord word = lsp_load_grid(
+      scene, lsp_walk.node * LSP_GRID_WORDS(lsp_load_header(scene).ntree_branching) + (index >> 5u));
   uint bit = index & 31u;
   if (((word.bits >> bit) & 1u) == 0u) return;
   LspCell record = lsp_load_cell(scene, word.offset + uint(bitCount(word.bits & ((1u << bit) - 1u))));
@@ -152,7 +154,8 @@ LSP_STEP void lsp_ntree_on(LspScene scene, LspSetup s, LspQuery q, float per_n) 
   uint n = lsp_load_header(scene).ntree_branching;
   if (q.far) {
     uint cells = n * n * n;
-    uint index = lsp_ntree_next_filled(scene, lsp_walk.node * LSP_GRID_WORDS(n), lsp_ntree_index(scene), cells);
+    uint index =
+        lsp_ntree_next_filled(scene, lsp_walk.node * LSP_GRID_WORDS(n), lsp_ntree_index(scene), cells);
     int row = int((float(index) + 0.5f) * per_n);
     int plane = int((float(row) + 0.5f) * per_n);
     lsp_walk.cell = lsp_walk.base + ivec3(int(index) - row * int(n), row - plane * int(n), plane);
@@ -162,8 +165,11 @@ LSP_STEP void lsp_ntree_on(LspScene scene, LspSetup s, LspQuery q, float per_n) 
   /* Out of a child the parent goes on along the same axis: its own planes may differ from the child's by a
    * rounding, and that is any distance along a ray that is nearly parallel to them. */
   if (lsp_walk.visit) {
-    lsp_walk.axis = lsp_walk.next.x <= lsp_walk.next.y ? (lsp_walk.next.x <= lsp_walk.next.z ? 0 : 2) : (lsp_walk.next.y <= lsp_walk.next.z ? 1 : 2);
-    lsp_walk.t = lsp_max(lsp_walk.t, lsp_walk.axis == 0 ? lsp_walk.next.x : (lsp_walk.axis == 1 ? lsp_walk.next.y : lsp_walk.next.z));
+    lsp_walk.axis = lsp_walk.next.x <= lsp_walk.next.y ? (lsp_walk.next.x <= lsp_walk.next.z ? 0 : 2)
+                                                       : (lsp_walk.next.y <= lsp_walk.next.z ? 1 : 2);
+    lsp_walk.t =
+        lsp_max(lsp_walk.t, lsp_walk.axis == 0 ? lsp_walk.next.x
+                                               : (lsp_walk.axis == 1 ? lsp_walk.next.y : lsp_walk.next.z));
   }
   ivec3 ahead = lsp_ntree_ahead(s);
   int coordinate;
@@ -186,8 +192,8 @@ LSP_STEP void lsp_ntree_on(LspScene scene, LspSetup s, LspQuery q, float per_n) 
 /* Whether cells do not cover the ray: see the top of this file. */
 LSP_FN bool lsp_is_far(LspScene scene, LspSetup s) { return s.err > lsp_load_header(scene).ntree_margin; }
 
-/* To what the ray visits first; LSP_NONE: it is answered already. Entry 0 of lsp_parents: as that of the stack in
- * lsp/bvh.h. */
+/* To what the ray visits first; LSP_NONE: it is answered already. Entry 0 of lsp_parents: as that of the
+ * stack in lsp/bvh.h. */
 LSP_STEP void lsp_begin(LspScene scene, LspSetup s, LspQuery q) {
   vec3 bounds_lo = lsp_vec3(lsp_load_header(scene).bounds_min);
   vec3 bounds_hi = lsp_vec3(lsp_load_header(scene).bounds_max);
@@ -217,7 +223,8 @@ LSP_STEP void lsp_begin(LspScene scene, LspSetup s, LspQuery q) {
   lsp_parents[0] = lsp_walk.ref;
 }
 
-/* From what was found last, or a child of the cell, to the next leaf or Line Space; LSP_NONE: there is none. */
+/* From what was found last, or a child of the cell, to the next leaf or Line Space; LSP_NONE: there is none.
+ */
 LSP_STEP void lsp_advance(LspScene scene, LspSetup s, LspQuery q) {
   /* What max_steps does not count: the way into the root, and Line Spaces, each of which is asked once. */
   uint most = lsp_load_header(scene).max_steps + 1u + lsp_load_header(scene).line_space_count;

@@ -1,19 +1,21 @@
 /* Exact and approximate traversal of an .lsp scene, in the common subset of GLSL 4.6 and C++20: of a BVH, or
  * with LSP_NTREE defined of an NTree.
  *
- * lsp.glsl includes this file in shaders, runtime/src/trace_bvh.cpp and its like within a struct, whose members the
- * functions and the stack then are: one text, so that both give the same bits. That holds where the compiler contracts
- * nothing (`precise`, -ffp-contract=off), rounds division and square root correctly, and evaluates what stands here:
- * min and max are written out because their answers to NaN are not the same everywhere.
+ * lsp.glsl includes this file in shaders, runtime/src/trace_bvh.cpp and its like within a struct, whose
+ * members the functions and the stack then are: one text, so that both give the same bits. That holds where
+ * the compiler contracts nothing (`precise`, -ffp-contract=off), rounds division and square root correctly,
+ * and evaluates what stands here: min and max are written out because their answers to NaN are not the same
+ * everywhere.
  *
- * The includer has defined LspScene, lsp_load_* and lsp_fetch_* (lsp.glsl, runtime/src/trace_subset.h). There is no
- * include guard: in C++ a file may hold the text in several structs.
+ * The includer has defined LspScene, lsp_load_* and lsp_fetch_* (lsp.glsl, runtime/src/trace_subset.h). There
+ * is no include guard: in C++ a file may hold the text in several structs.
  *
- * LSP_FN marks what depends on its arguments alone, LSP_STEP what goes on with lsp_walk and its stack. These are global
- * in GLSL, where an array or a struct handed to a function is copied, and members in C++. A trace is lsp_setup, lsp_begin, then lsp_advance and what it finds, lsp_test_leaf or the stages of a look-up
- * (lsp_find_shaft, lsp_find_entry, lsp_candidate, lsp_answer), until it finds nothing, then lsp_end and lsp_finish.
- * lsp_trace_ready takes these steps one after the other; the library takes those of several rays in turn. A base
- * structure's own are in its header.
+ * LSP_FN marks what depends on its arguments alone, LSP_STEP what goes on with lsp_walk and its stack. These
+ * two are global in GLSL, where an array handed to a function is copied, and members in C++, where a struct
+ * is. A trace is lsp_setup, lsp_begin, then lsp_advance and what it finds, lsp_test_leaf or the stages of a
+ * look-up (lsp_find_shaft, lsp_find_entry, lsp_candidate, lsp_answer), until it finds nothing, then lsp_end
+ * and lsp_finish. lsp_trace_ready takes these steps one after the other; the library takes those of several
+ * rays in turn. A base structure's own are in its header.
  *
  * Sources. Triangles: Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection", JCGT 2013. Boxes: Ize,
  * "Robust BVH Ray Traversal", JCGT 2013. Line Spaces: Keul, Koss, Mueller, "Fast Indirect Lighting
@@ -23,7 +25,8 @@
  * [1, 4). With R the largest distance along an axis from the origin to a side of the scene's box:
  *   - a slab plane (lo - o) * inv is off by 3 u R along the axis at most (one subtraction, the reciprocal,
  *     one product);
- *   - a corner in the triangle's ray space is off by 5 u R (translation, shear quotient, product, difference);
+ *   - a corner in the triangle's ray space is off by 5 u R (translation, shear quotient, product,
+ * difference);
  *   - the sign of an edge function of two such corners is never wrong, only lost to zero: products round
  *     monotonically. Zero counts as inside, so a ray through an edge or corner hits one of the neighbours.
  * A box is therefore grown by err = 16 u R + 4 u max|o| on every side, which covers both, and the rounding of
@@ -84,7 +87,7 @@ struct LspSetup {
   float tmax;
   float to_scaled; /* t (scaled) = t (given) * to_scaled */
   float to_given;
-  int axis; /* of the largest component of direction */
+  int axis;   /* of the largest component of direction */
   bool valid; /* else nothing but this is set */
 };
 
@@ -137,8 +140,8 @@ LSP_FN bool lsp_is_finite(float x) { return (floatBitsToUint(x) & 0x7F800000u) !
 LSP_FN bool lsp_all_finite(vec3 v) { return lsp_is_finite(v.x) && lsp_is_finite(v.y) && lsp_is_finite(v.z); }
 
 /* |d| under 2^-60 of the largest component cannot move a ray by an ulp of the scene: it is taken for zero, or
- * products of it would underflow in the triangle test. Its slab is either hit along its whole length or missed,
- * and a finite reciprocal keeps 0 * infinity out of the arithmetic. */
+ * products of it would underflow in the triangle test. Its slab is either hit along its whole length or
+ * missed, and a finite reciprocal keeps 0 * infinity out of the arithmetic. */
 LSP_FN float lsp_no_trifle(float d) { return abs(d) < 8.6736174e-19f ? 0.0f : d; }
 
 LSP_FN float lsp_reciprocal(float d) {
@@ -151,8 +154,8 @@ LSP_FN vec3 lsp_rotate(vec3 v, int axis) {
   return axis == 2 ? v : (axis == 0 ? vec3(v.y, v.z, v.x) : vec3(v.z, v.x, v.y));
 }
 
-/* Invalid are a NaN anywhere, a non-finite origin or direction, a direction of zero or of denormal length, and
- * tmin > tmax. */
+/* Invalid are a NaN anywhere, a non-finite origin or direction, a direction of zero or of denormal length,
+ * and tmin > tmax. */
 LSP_FN LspSetup lsp_setup(LspScene scene, LspRay ray) {
   LspSetup s;
   s.valid = false;
@@ -172,8 +175,10 @@ LSP_FN LspSetup lsp_setup(LspScene scene, LspRay ray) {
   s.axis = axis;
   s.origin = o;
   s.direction = vec3(lsp_no_trifle(d.x * shrink), lsp_no_trifle(d.y * shrink), lsp_no_trifle(d.z * shrink));
-  s.inverse = vec3(lsp_reciprocal(s.direction.x), lsp_reciprocal(s.direction.y), lsp_reciprocal(s.direction.z));
-  /* A step of the denormals inside the interval: what is given back, rounded among them, must lie in it too. */
+  s.inverse =
+      vec3(lsp_reciprocal(s.direction.x), lsp_reciprocal(s.direction.y), lsp_reciprocal(s.direction.z));
+  /* A step of the denormals inside the interval: what is given back, rounded among them, must lie in it too.
+   */
   precise float step = uintBitsToFloat(1u) * s.to_scaled;
   precise float first = ray.tmin * s.to_scaled + step;
   precise float last = lsp_min(ray.tmax, LSP_FLOAT_MAX) * s.to_scaled - step;
@@ -226,11 +231,12 @@ LSP_FN float lsp_largest(vec3 v) {
 #endif
 
 /* Where the ray meets the plane of a triangle that it passes: a, b, c are the corners seen from the origin,
- * the ray's axis last, as in `direction`. The corners' own depths averaged by the edge functions would be an error of 5 u R over
- * the smallest height of the triangle off, however near the hit; the plane is off by what the normal is. That
- * is best at the corner opposite the longest edge: of a needle the other two give a difference of large
- * products. No hit lies outside the depths of the corners, so what a needle can err is bounded by its own
- * extent. Edges are scaled by a power of two (exact): products of three small lengths would underflow. */
+ * the ray's axis last, as in `direction`. The corners' own depths averaged by the edge functions would be an
+ * error of 5 u R over the smallest height of the triangle off, however near the hit; the plane is off by what
+ * the normal is. That is best at the corner opposite the longest edge: of a needle the other two give a
+ * difference of large products. No hit lies outside the depths of the corners, so what a needle can err is
+ * bounded by its own extent. Edges are scaled by a power of two (exact): products of three small lengths
+ * would underflow. */
 LSP_FN_RARE float lsp_plane_depth(vec3 direction, float shear_z, vec3 a, vec3 b, vec3 c) {
   precise vec3 ab = b - a;
   precise vec3 bc = c - b;
@@ -307,7 +313,8 @@ LSP_FN vec3 lsp_interpolated_normal(LspScene scene, uint index, float u, float v
   return n;
 }
 
-/* The paper's edge criterion: does the extrapolated normal leave the cone about the triangle's mean normal? */
+/* The paper's edge criterion: does the extrapolated normal leave the cone about the triangle's mean normal?
+ */
 LSP_FN bool lsp_leaves_cone(LspScene scene, uint index, float u, float v) {
   vec3 n = lsp_interpolated_normal(scene, index, u, v);
   vec3 mean = lsp_interpolated_normal(scene, index, 0.33333334f, 0.33333334f);
@@ -423,8 +430,8 @@ LSP_FN bool lsp_may_hit(LspPassage pass, LspBest best) {
   return pass.t_in <= pass.t_out && pass.t_in < best.t;
 }
 
-/* The paper's algorithm 1, from the candidate on: it is taken as an infinite plane. A plane hit outside the box by
- * less than the tolerance is moved to the box. */
+/* The paper's algorithm 1, from the candidate on: it is taken as an infinite plane. A plane hit outside the
+ * box by less than the tolerance is moved to the box. */
 LSP_FN LspBest lsp_hit_candidate(LspScene scene, LspSetup s, LspLineSpace ls, LspPassage pass, uint candidate,
                                  LspBest best) {
   if ((LSP_PARTS & LSP_PART_BINARY) != 0u && lsp_is_binary(ls)) {
@@ -453,8 +460,8 @@ LSP_FN LspBest lsp_hit_candidate(LspScene scene, LspSetup s, LspLineSpace ls, Ls
   t = t < pass.t_in ? pass.t_in : t;
   t = t > pass.t_out ? pass.t_out : t;
   if (!(t > s.tmin && t < best.t)) return best;
-  if ((LSP_PARTS & LSP_PART_NORMAL_ANGLE) != 0u && lsp_load_header(scene).normal_angle_cos > -1.0f && lsp_has_normals(scene) &&
-      (tri.flags & LSP_TRIANGLE_SMOOTH) != 0u) {
+  if ((LSP_PARTS & LSP_PART_NORMAL_ANGLE) != 0u && lsp_load_header(scene).normal_angle_cos > -1.0f &&
+      lsp_has_normals(scene) && (tri.flags & LSP_TRIANGLE_SMOOTH) != 0u) {
     vec2 weights = lsp_plane_weights(s, tri, t);
     if (lsp_leaves_cone(scene, candidate, weights.x, weights.y)) return best;
   }
@@ -464,8 +471,9 @@ LSP_FN LspBest lsp_hit_candidate(LspScene scene, LspSetup s, LspLineSpace ls, Ls
   return best;
 }
 
-/* Whether the last surface along the line of a ray that starts inside the box of a Line Space, which the shaft of the
- * opposite direction knows, lies behind the origin or is the one the ray starts on: then nothing is ahead. */
+/* Whether the last surface along the line of a ray that starts inside the box of a Line Space, which the
+ * shaft of the opposite direction knows, lies behind the origin or is the one the ray starts on: then nothing
+ * is ahead. */
 LSP_FN bool lsp_is_behind(LspScene scene, LspSetup s, LspLineSpace ls, uint candidate) {
   if ((LSP_PARTS & LSP_PART_BINARY) != 0u && lsp_is_binary(ls)) return false;
   LspTriangle tri = lsp_load_triangle(scene, candidate);
@@ -481,7 +489,8 @@ LSP_FN bool lsp_is_behind(LspScene scene, LspSetup s, LspLineSpace ls, uint cand
 /* Whether a reference is an inner node's; LSP_NONE has a leaf's bit. */
 LSP_FN bool lsp_is_node(uint ref) { return (ref & (LSP_LEAF_BIT | LSP_STACK_LINE_SPACE_BIT)) == 0u; }
 
-/* Whether a reference on the stack asks if the ray leaves a box freely; neither a leaf's nor LSP_NONE does. */
+/* Whether a reference on the stack asks if the ray leaves a box freely; neither a leaf's nor LSP_NONE does.
+ */
 LSP_FN bool lsp_is_near(uint ref) { return (ref >> 29u) == 3u; }
 
 LSP_FN uint lsp_line_space_index(uint ref) { return ref & LSP_STACK_INDEX_MASK; }
@@ -501,12 +510,13 @@ LSP_FN bool lsp_is_empty(LspScene scene, LspSetup s, uint index) {
   if ((ls.format & LSP_FORMAT_CONSERVATIVE) == 0u || (ls.format & LSP_FORMAT_DENSE) != 0u) return false;
   LspPassage pass = lsp_pass(s, ls);
   if (!(pass.t_in <= pass.t_out)) return false;
-  return ((lsp_load_bit_word(scene, ls.word_first + (pass.shaft >> 5u)).bits >> (pass.shaft & 31u)) & 1u) == 0u;
+  return ((lsp_load_bit_word(scene, ls.word_first + (pass.shaft >> 5u)).bits >> (pass.shaft & 31u)) & 1u) ==
+         0u;
 }
 
 /* What to visit for a child hit at t_in: itself, or in an approximate trace its Line Space. Look-ups, but for
- * those that skip empty shafts, are left to the caller: a device that runs both sides of every branch would do them
- * for both children of every node. */
+ * those that skip empty shafts, are left to the caller: a device that runs both sides of every branch would
+ * do them for both children of every node. */
 LSP_FN uint lsp_visit(LspScene scene, LspSetup s, LspQuery q, uint child, uint line_space, vec3 lo, vec3 hi,
                       float t_in) {
   if (line_space == LSP_NONE) return child;
@@ -556,11 +566,14 @@ LSP_STEP uint lsp_find_entry(LspScene scene, LspQuery q, LspLineSpace ls, LspPas
   return lsp_asks_near(q) || lsp_may_hit(pass, lsp_walk.best) ? lsp_entry(scene, ls, pass.shaft) : LSP_NONE;
 }
 
-/* A ray that leaves freely is done with the node, one that does not goes on to what the Line Space stands for. */
-LSP_STEP void lsp_answer(LspScene scene, LspSetup s, LspQuery q, LspLineSpace ls, LspPassage pass, uint candidate) {
+/* A ray that leaves freely is done with the node, one that does not goes on to what the Line Space stands
+ * for. */
+LSP_STEP void lsp_answer(LspScene scene, LspSetup s, LspQuery q, LspLineSpace ls, LspPassage pass,
+                         uint candidate) {
   lsp_walk.counts.shafts += 1u;
   if (lsp_asks_near(q)) {
-    bool freely = pass.t_in <= pass.t_out && (candidate == LSP_NONE || lsp_is_behind(scene, s, ls, candidate));
+    bool freely =
+        pass.t_in <= pass.t_out && (candidate == LSP_NONE || lsp_is_behind(scene, s, ls, candidate));
     lsp_walk.ref = freely ? LSP_NONE : ls.child;
     return;
   }
@@ -636,7 +649,8 @@ LSP_FN LspTraced lsp_invalid_ray() {
 
 /* Traces a valid ray from the root. */
 LSP_STEP LspTraced lsp_trace_ready(LspScene scene, LspSetup s, LspQuery q, LspRay ray) {
-  if ((q.flags & LSP_TRACE_SKIP_EMPTY) != 0u && !lsp_may_skip_empty(scene, s)) q.flags &= ~LSP_TRACE_SKIP_EMPTY;
+  if ((q.flags & LSP_TRACE_SKIP_EMPTY) != 0u && !lsp_may_skip_empty(scene, s))
+    q.flags &= ~LSP_TRACE_SKIP_EMPTY;
   lsp_begin(scene, s, q);
   bool going = lsp_walk.ref != LSP_NONE;
   while (going) {
