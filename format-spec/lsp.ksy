@@ -27,6 +27,14 @@ enums:
     0x44495247: grid
     0x4c4c4543: cell
     0x53464552: refs
+    0x44524743: cgrd
+    0x544c4543: celt
+    0x544e4543: cent
+    0x4e4c5043: cpln
+    0x43525043: cprc
+    0x4c505343: cspl
+    0x444f4e43: cnod
+    0x46455243: cref
     0x4154454d: meta
   codec:
     0: none
@@ -34,6 +42,7 @@ enums:
   base_structure:
     1: bvh
     2: ntree
+    3: cells
 types:
   vec3:
     seq:
@@ -49,12 +58,12 @@ types:
         contents: [0x89, 0x4c, 0x53, 0x50, 0x0d, 0x0a, 0x1a, 0x0a]
       - id: version_major
         type: u4
-        valid: 1
+        valid: 2
       - id: version_minor
         type: u4
       - id: header_bytes
         type: u4
-        valid: 256
+        valid: 384
       - id: section_count
         type: u4
       - id: required_features
@@ -65,7 +74,7 @@ types:
         type: u8
       - id: section_table_offset
         type: u8
-        valid: 256
+        valid: 384
       - id: alignment
         type: u4
       - id: base_structure
@@ -134,10 +143,65 @@ types:
         type: f4
       - id: ntree_margin
         type: f4
-      - id: reserved
+      - id: reserved_1
         type: u4
         repeat: expr
         repeat-expr: 3
+      - id: cells_lo
+        type: vec3
+      - id: cells_size
+        type: f4
+      - id: cells_cells_x
+        type: u4
+      - id: cells_cells_y
+        type: u4
+      - id: cells_cells_z
+        type: u4
+      - id: cells_per_size
+        type: f4
+      - id: cells_margin
+        type: f4
+      - id: cells_box_step
+        type: f4
+      - id: cells_far_patches
+        type: u4
+      - id: cells_origin_patches
+        type: u4
+      - id: cells_sub_cells
+        type: u4
+      - id: cells_origin_entry_first
+        type: u4
+      - id: cells_reserved
+        type: u4
+        repeat: expr
+        repeat-expr: 2
+      - id: origin_x
+        type: u8
+        doc: float64
+      - id: origin_y
+        type: u8
+        doc: float64
+      - id: origin_z
+        type: u8
+        doc: float64
+      - id: filled_cell_count
+        type: u4
+      - id: entry_word_count
+        type: u4
+      - id: plane_count
+        type: u4
+      - id: split_count
+        type: u4
+      - id: cell_node_count
+        type: u4
+      - id: cell_reference_count
+        type: u4
+      - id: quality
+        type: u4
+        repeat: expr
+        repeat-expr: 3
+      - id: reserved_2
+        type: u4
   section:
     seq:
       - id: type
@@ -185,6 +249,14 @@ types:
             'section_type::grid': bit_words
             'section_type::cell': cells
             'section_type::refs': words
+            'section_type::cgrd': words
+            'section_type::celt': filled_cells
+            'section_type::cent': words
+            'section_type::cpln': planes
+            'section_type::cprc': words
+            'section_type::cspl': splits
+            'section_type::cnod': cell_nodes
+            'section_type::cref': words
             'section_type::meta': provenance
       unpacked_body:
         io: _root._io
@@ -389,6 +461,74 @@ types:
       - id: bits
         type: u4
       - id: offset
+        type: u4
+  filled_cells:
+    seq:
+      - id: elements
+        type: filled_cell
+        repeat: eos
+  filled_cell:
+    seq:
+      - id: sub_mask_lo
+        type: u4
+      - id: sub_mask_hi
+        type: u4
+      - id: sub_first
+        type: u4
+      - id: reserved
+        type: u4
+      - id: plane_first
+        type: u4
+      - id: plane_count
+        type: u4
+      - id: split_first
+        type: u4
+      - id: split_count
+        type: u4
+      - id: root
+        type: u4
+      - id: node_first
+        type: u4
+      - id: reference_first
+        type: u4
+      - id: max_steps
+        type: u4
+  planes:
+    seq:
+      - id: elements
+        type: plane
+        repeat: eos
+  plane:
+    seq:
+      - id: normal
+        type: vec3
+      - id: distance
+        type: f4
+  splits:
+    seq:
+      - id: elements
+        type: split
+        repeat: eos
+  split:
+    seq:
+      - id: answers
+        type: u4
+      - id: weights
+        type: u4
+  cell_nodes:
+    seq:
+      - id: elements
+        type: cell_node
+        repeat: eos
+  cell_node:
+    seq:
+      - id: box_0
+        type: u4
+      - id: box_1
+        type: u4
+      - id: box_2
+        type: u4
+      - id: children
         type: u4
   words:
     doc: Candidate entries of 1, 2 or 4 bytes, packed; or indices of triangles.

@@ -241,4 +241,37 @@ void keep_approximate_only(Baked& baked) {
   baked.skipped.push_back("triangles no shaft refers to: " + with_commas(triangles - baked.triangles.size()));
 }
 
+void keep_tables_only(Baked& baked) {
+  CellTables& tables = baked.cell_tables;
+  std::vector<uint32_t> number(baked.triangles.size(), LSP_NONE);
+  std::vector<LspTriangle> triangles;
+  std::vector<LspCornerNormals> normals;
+  for (uint32_t& record : tables.plane_records) {
+    if (number[record] == LSP_NONE) {
+      number[record] = uint32_t(triangles.size());
+      triangles.push_back(baked.triangles[record]);
+      if (!baked.normals.empty()) normals.push_back(baked.normals[record]);
+    }
+    record = number[record];
+  }
+  baked.skipped.push_back("triangles that no plane is of: " + with_commas(baked.triangles.size() - triangles.size()) +
+                          " of " + with_commas(baked.triangles.size()));
+  baked.triangles = std::move(triangles);
+  baked.normals = std::move(normals);
+  baked.nodes.clear();
+  tables.nodes.clear();
+  tables.references.clear();
+  for (LspFilledCell& cell : tables.cells) {
+    cell.root = LSP_CELL_NO_CHILD;
+    cell.node_first = cell.reference_first = cell.max_steps = 0;
+  }
+  LspHeader& h = baked.header;
+  h.required_features &= ~LSP_FEATURE_EXACT;
+  h.root = LSP_NONE;
+  h.max_depth = h.max_steps = h.max_leaf_triangles = 0;
+  h.max_stack = 1;
+  for (uint32_t& dial : h.quality) dial = LSP_DIAL_TABLES;
+  set_counts(baked);
+}
+
 }  // namespace lsp

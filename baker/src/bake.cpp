@@ -4,10 +4,12 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <bit>
 #include <chrono>
 #include <cmath>
 
 #include "box.h"
+#include "cells/dial.h"
 #include "lsp/program.h"
 #include "lsp/sections.h"
 #include "normals.h"
@@ -117,6 +119,20 @@ void plan_memory(const Mesh& mesh, BakeOptions& options) {
                       " MiB: raise --memory-limit, or lower --depth or --resolution");
 }
 
+void fill_cells(Baked& baked, const Bvh& bvh, const Box& bounds, const BakeOptions& options,
+                const std::function<void(double)>& progress) {
+  LspHeader& h = baked.header;
+  h.base_structure = LSP_BASE_CELLS;
+  baked.cell_grid = options.cells ? build_cell_grid(baked.triangles, bounds, options.cells)
+                                  : choose_cell_grid(baked.triangles, bounds);
+  baked.cell_tables =
+      fill_cell_tables(baked.cell_grid, bvh, h, baked.triangles, options.cell_tables, progress);
+  set_cells(baked.cell_grid, baked.cell_tables, options.cell_tables, h);
+  const size_t cells = baked.cell_grid.words.size();
+  baked.skipped.push_back("empty cells: " + with_commas(cells - baked.cell_tables.cells.size()) + " of " +
+                          with_commas(cells));
+}
+
 }  // namespace
 
 std::string with_commas(uint64_t n) {
@@ -192,6 +208,9 @@ Baked bake(const Mesh& mesh, const BakeOptions& asked, const Progress& progress)
   h.bounds_min = f3(bounds.lo);
   h.bounds_max = f3(bounds.hi);
   h.primitive_count = mesh.primitive_count;
+  h.origin_x = std::bit_cast<uint64_t>(mesh.origin.x);
+  h.origin_y = std::bit_cast<uint64_t>(mesh.origin.y);
+  h.origin_z = std::bit_cast<uint64_t>(mesh.origin.z);
   h.plane_tolerance = options.plane_tolerance;
   h.normal_angle_cos =
       options.normal_angle_degrees >= 180 ? -1.0f : std::cos(options.normal_angle_degrees * 0.017453293f);
@@ -206,7 +225,12 @@ Baked bake(const Mesh& mesh, const BakeOptions& asked, const Progress& progress)
     baked.tree_seconds += seconds_since(start);
   }
 
-  if (options.line_spaces) {
+  const bool cells = options.base == Base::kCells;
+  if (cells) {
+    start = std::chrono::steady_clock::now();
+    fill_cells(baked, bvh, bounds, options, stage("cells"));
+    baked.line_space_seconds = seconds_since(start);
+  } else if (options.line_spaces) {
     start = std::chrono::steady_clock::now();
     const std::vector<LineSpaceSite> sites = ntree ? choose_sites(baked.ntree, bvh, h, options.line_space)
                                                    : choose_sites(bvh, h, options.line_space);
@@ -228,13 +252,14 @@ Baked bake(const Mesh& mesh, const BakeOptions& asked, const Progress& progress)
   if (!ntree) baked.nodes = std::move(bvh.nodes);
 
   h.required_features =
-      LSP_FEATURE_EXACT | (ntree ? LSP_FEATURE_NTREE : 0) |
+      LSP_FEATURE_EXACT | (ntree ? LSP_FEATURE_NTREE : 0) | (cells ? LSP_FEATURE_CELLS : 0) |
       (baked.line_spaces.records.empty() ? 0 : LSP_FEATURE_LINE_SPACES) |
       (normals ? LSP_FEATURE_NORMALS : 0) | (shading ? LSP_FEATURE_MATERIALS : 0) |
       (!baked.line_spaces.records.empty() && options.line_space.kind == LineSpaceKind::kBinary
            ? LSP_FEATURE_BINARY
            : 0);
   set_counts(baked);
+  if (cells) choose_dial(baked);
   return baked;
 }
 

@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "bvh.h"
+#include "cells/cell_grid.h"
+#include "cells/cell_tables.h"
 #include "line_space.h"
 #include "lsp/layout.h"
 #include "lsp/lsp.h"
@@ -26,7 +28,7 @@ enum class Purpose {
   kAll,
 };
 
-enum class Base { kBvh, kNTree };
+enum class Base { kBvh, kNTree, kCells };
 
 struct BakeOptions {
   Purpose purpose = Purpose::kAll;
@@ -35,6 +37,8 @@ struct BakeOptions {
   BvhOptions bvh;
   NTreeOptions ntree;
   LineSpaceOptions line_space;
+  uint32_t cells = 0;  // along the longest side of the grid; 0: chosen from the scene
+  CellTableOptions cell_tables;
   float plane_tolerance = 0.0f;         // LspHeader.plane_tolerance
   float normal_angle_degrees = 180.0f;  // LspHeader.normal_angle_cos; 180: no hit is rejected
   uint64_t memory_limit = 0;            // bytes, 0: none
@@ -47,6 +51,8 @@ struct Baked {
   LspHeader header{};
   std::vector<LspNode> nodes;  // of a BVH
   NTree ntree;                 // or of an NTree
+  CellGrid cell_grid;          // or cells, beside the BVH
+  CellTables cell_tables;
   std::vector<LspTriangle> triangles;
   std::vector<LspCornerNormals> normals;  // empty: no section
   std::vector<LspMaterial> materials;     // empty: no section
@@ -69,6 +75,14 @@ struct SectionArrays {
   const std::vector<LspBitWord>& grid = baked.ntree.grid;
   const std::vector<LspCell>& cells = baked.ntree.cells;
   const std::vector<uint32_t>& references = baked.ntree.references;
+  const std::vector<uint32_t>& cell_words = baked.cell_grid.words;
+  const std::vector<LspFilledCell>& filled_cells = baked.cell_tables.cells;
+  const std::vector<uint32_t>& entries = baked.cell_tables.entries;
+  const std::vector<LspPlane>& planes = baked.cell_tables.planes;
+  const std::vector<uint32_t>& plane_records = baked.cell_tables.plane_records;
+  const std::vector<LspSplit>& splits = baked.cell_tables.splits;
+  const std::vector<LspCellNode>& cell_nodes = baked.cell_tables.nodes;
+  const std::vector<uint32_t>& cell_references = baked.cell_tables.references;
 };
 
 // Called with the stage's name and the share of it done, from any thread.
@@ -81,6 +95,9 @@ Baked bake(const Mesh& mesh, const BakeOptions& options, const Progress& progres
 // Leaves out of `baked` what only exact traces need: nodes below terminal Line Spaces and the triangles there
 // that no shaft refers to.
 void keep_approximate_only(Baked& baked);
+
+// The same of cells: nodes, cells' trees, and the triangles that no plane is of.
+void keep_tables_only(Baked& baked);
 
 // The bake as a scene to trace; it points into `baked`.
 lsp_scene view(const Baked& baked);

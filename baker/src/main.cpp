@@ -30,6 +30,7 @@ struct Arguments {
   std::vector<std::filesystem::path> inputs;
   std::filesystem::path output;
   std::string base = "bvh";
+  uint32_t cells = 0;
   uint32_t branching = 0;  // 0: the resolution
   uint32_t levels = kNTreeLevels;
   uint32_t resolution = 6;
@@ -139,8 +140,9 @@ void write_depfile(const Arguments& a, const Mesh& mesh) {
 }
 
 // Provenance: nothing in it depends on the machine, the time, the threads or the folder.
-Json provenance(const Arguments& a, const Mesh& mesh, const std::vector<std::string>& material_names,
-                const std::array<uint64_t, 2>& source, const MeasuredError& error) {
+Json provenance(const Arguments& a, const Baked& baked, const Mesh& mesh,
+                const std::vector<std::string>& material_names, const std::array<uint64_t, 2>& source,
+                const MeasuredError& error) {
   Json inputs = Json::array();
   for (const auto& p : a.inputs) inputs.push_back(printable(p.filename().string()));
   Json sources = Json::array();
@@ -160,6 +162,7 @@ Json provenance(const Arguments& a, const Mesh& mesh, const std::vector<std::str
           {"source_hash", hex128(source[0], source[1])},
           {"options",
            {{"base", a.base},
+            {"cells", baked.header.cells.cells_x ? std::max({baked.header.cells.cells_x, baked.header.cells.cells_y, baked.header.cells.cells_z}) : 0},
             {"branching", a.branching},
             {"levels", a.base == "ntree" ? a.levels : 0},
             {"resolution", a.resolution},
@@ -200,6 +203,14 @@ Exit run(Arguments a) {
   const bool ntree = a.base == "ntree";
   if (!ntree && (a.branching || a.levels != kNTreeLevels))
     throw Failure(Exit::kUsage, "", "--branching and --levels need --base ntree");
+  const bool cells = a.base == "cells";
+  if (a.cells && !cells) throw Failure(Exit::kUsage, "", "--cells needs --base cells");
+  if (cells && (a.resolution_given || a.depth_given || a.samples_given || a.no_line_spaces || a.max_error > 0))
+    throw Failure(Exit::kUsage, "",
+                  "--base cells has its own tables: leave out --resolution, --depth, --samples, --max-error and "
+                  "--no-line-spaces");
+  if (cells && a.purpose == Purpose::kVisibility)
+    throw Failure(Exit::kUsage, "", "--for visibility needs Line Spaces: leave out --base cells");
   if (ntree && a.max_error > 0)
     throw Failure(Exit::kUsage, "", "--max-error chooses among BVHs, leave out --base");
   if (!a.resolution_given) a.resolution = preset.resolution;
@@ -236,7 +247,8 @@ Exit run(Arguments a) {
   BakeOptions options;
   options.purpose = a.purpose;
   options.line_spaces = !a.no_line_spaces;
-  options.base = ntree ? Base::kNTree : Base::kBvh;
+  options.base = ntree ? Base::kNTree : cells ? Base::kCells : Base::kBvh;
+  options.cells = a.cells;
   options.ntree.branching = a.branching;
   options.ntree.levels = a.levels;
   options.bvh.spatial_splits = !a.no_splits;
@@ -280,7 +292,9 @@ Exit run(Arguments a) {
     baked = bake_with(a);
     if (measure) error = measure_error(baked, kErrorRays);
   }
-  if (a.no_exact && baked.line_spaces.records.empty())
+  if (a.no_exact && cells)
+    keep_tables_only(baked);
+  else if (a.no_exact && baked.line_spaces.records.empty())
     baked.skipped.push_back(
         "leaving out the exact tree: the scene is too small for Line Spaces at this depth");
   else if (a.no_exact)
@@ -290,7 +304,7 @@ Exit run(Arguments a) {
   timer();
 
   bar.show("write", 0);
-  const Json meta = provenance(a, mesh, material_names, source, error);
+  const Json meta = provenance(a, baked, mesh, material_names, source, error);
   const Written written =
       write_lsp(a.output, baked, meta.dump(), {a.align, a.compress == "zstd", 12, a.memory_limit});
   if (!a.depfile.empty()) write_depfile(a, mesh);
@@ -339,6 +353,9 @@ Exit run(Arguments a) {
     for (const std::string& note : mesh.notes) std::printf("note        %s\n", note.c_str());
     std::printf("tree        %u nodes, %u triangle records, depth %u\n", baked.header.node_count,
                 baked.header.triangle_count, baked.header.max_depth);
+    if (const LspCellGrid& g = baked.header.cells; cells)
+      std::printf("cells       %u x %u x %u, %u filled; %u splits, %u planes\n", g.cells_x, g.cells_y, g.cells_z,
+                  baked.header.filled_cell_count, baked.header.split_count, baked.header.plane_count);
     if (baked.header.line_space_count)
       std::printf("Line Spaces %u, %.1f %% of the shafts filled\n", baked.header.line_space_count,
                   100.0 * double(ls.filled) / double(std::max<uint64_t>(1, ls.shafts)));
@@ -370,7 +387,9 @@ int main(int argc, char** argv) {
   app.option_defaults()->always_capture_default();
   app.add_option("INPUT", a.inputs, "Mesh files, read in this order")->required();
   app.add_option("-o,--output", a.output, "The .lsp file to write")->required();
-  app.add_option("--base", a.base, "Base structure")->check(CLI::IsMember({"bvh", "ntree"}));
+  app.add_option("--base", a.base, "Base structure")->check(CLI::IsMember({"bvh", "ntree", "cells"}));
+  app.add_option("--cells", a.cells, "Cells along the longest side of the grid of --base cells; 0: chosen from the scene")
+      ->check(CLI::Range(0u, LSP_MAX_CELLS));
   app.add_option("--branching", a.branching, "NTree: cells along an edge of a node; 0: as --resolution")
       ->check(CLI::IsMember({0}) | CLI::Range(2u, LSP_MAX_BRANCHING));
   app.add_option("--levels", a.levels, "NTree: levels of nodes")->check(CLI::Range(1u, LSP_MAX_NTREE_DEPTH));

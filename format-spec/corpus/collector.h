@@ -86,7 +86,8 @@ class Collector {
   }
 };
 
-// The files that break the rules of the NTree.
+// The files that break the rules of the NTree, and of cells.
 void break_ntrees(Collector& c);
+void break_cells(Collector& c);
 
 }  // namespace lsp::corpus

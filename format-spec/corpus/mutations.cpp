@@ -23,7 +23,7 @@ void identification(Collector& c) {
   c.raw(RuleId::kTooShort, "the file ends after 255 bytes", [](Bytes& b) { b.resize(255); });
   c.header(RuleId::kBadMagic, "the first byte is 8A", [](LspHeader& h) { h.magic_0 += 1; });
   c.raw(RuleId::kTextDamage, "CR LF of the signature became LF", [](Bytes& b) { b.erase(b.begin() + 4); });
-  c.header(RuleId::kOtherMajor, "version_major is 2", [](LspHeader& h) { h.version_major = 2; });
+  c.header(RuleId::kOtherMajor, "version_major is 1", [](LspHeader& h) { h.version_major = 1; });
   c.header(RuleId::kNewerMinor, "version_minor is 1", [](LspHeader& h) { h.version_minor = 1; });
   c.header(RuleId::kUnknownRequired, "bit 31 of required_features is set",
            [](LspHeader& h) { h.required_features |= 0x80000000u; });
@@ -45,8 +45,8 @@ void header(Collector& c) {
     b.erase(b.end() - 16, b.end());
     header_of(b).file_bytes -= 16;
   });
-  c.header(RuleId::kBaseStructure, "base_structure is 3", [](LspHeader& h) { h.base_structure = 3; });
-  c.header(RuleId::kReservedNotZero, "reserved[2] is 1", [](LspHeader& h) { h.reserved[2] = 1; });
+  c.header(RuleId::kBaseStructure, "base_structure is 4", [](LspHeader& h) { h.base_structure = 4; });
+  c.header(RuleId::kReservedNotZero, "reserved_1[2] is 1", [](LspHeader& h) { h.reserved_1[2] = 1; });
   c.header(RuleId::kBoundsNotFinite, "bounds_max.x is infinite",
            [](LspHeader& h) { h.bounds_max.x = kInfinity; });
   c.header(RuleId::kTolerances, "normal_angle_cos is NaN",
@@ -347,6 +347,7 @@ std::vector<InvalidFile> invalid_files() {
   geometry(collector);
   metadata_and_source(collector);
   break_ntrees(collector);
+  break_cells(collector);
   return std::move(collector.files);
 }
 

@@ -1,4 +1,5 @@
 // Identification and header: what the first 256 bytes may say.
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstring>
@@ -55,9 +56,9 @@ void check_features(const LspHeader& header, const FileView& view, Report& repor
     if (known.feature != 0)
       expect(known.feature, has(known.type), *header_count(header, static_cast<Kind>(kind)), known.name);
   }
-  if ((features & (LSP_FEATURE_EXACT | LSP_FEATURE_LINE_SPACES)) == 0)
+  if ((features & (LSP_FEATURE_EXACT | LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS)) == 0)
     LSP_HEADER_FINDING(kNothingToTrace, required_features,
-                       "neither EXACT nor LINE_SPACES is set: no ray can be traced");
+                       "neither EXACT nor LINE_SPACES nor CELLS is set: no ray can be traced");
 }
 
 void check_root(const LspHeader& header, Report& report) {
@@ -66,7 +67,8 @@ void check_root(const LspHeader& header, Report& report) {
       LSP_HEADER_FINDING(kRootReference, root,
                          "is " + hex(header.root) + ", but a file with nodes has root 0");
   } else if (header.root == LSP_NONE) {
-    if (header.triangle_count != 0 && header.root_line_space == LSP_NONE)
+    const bool tables_alone = has_cells(header) && (header.required_features & LSP_FEATURE_EXACT) == 0;
+    if (header.triangle_count != 0 && header.root_line_space == LSP_NONE && !tables_alone)
       LSP_HEADER_FINDING(kRootReference, root, "is none, but the file has triangles");
   } else if ((header.root & LSP_LEAF_BIT) == 0 || is_ntree(header)) {
     LSP_HEADER_FINDING(kRootReference, root, "is " + hex(header.root) + ", but there are no nodes");
@@ -101,13 +103,41 @@ void check_cube(const LspHeader& header, Report& report) {
     LSP_HEADER_FINDING(kNtreeCube, ntree_lo, "the bounds reach outside the cube");
 }
 
+void check_grid(const LspHeader& header, Report& report) {
+  const LspCellGrid& g = header.cells;
+  constexpr LspCellGrid kNone{};
+  const auto positive = [](float x) { return x > 0 && std::isfinite(x); };
+  const auto near = [](double x, double y) { return std::fabs(x - y) <= 1e-6 * std::fabs(y); };
+  bool good = std::memcmp(&g, &kNone, sizeof g) == 0;
+  if (has_cells(header))
+    good = cells_readable(header) && finite(g.lo) && positive(g.size) && positive(g.per_size) && positive(g.margin) &&
+           positive(g.box_step) && near(double(g.per_size) * g.size, 1) &&
+           near(255.0 * g.box_step, g.size + 2.0 * g.margin);
+  if (!good) LSP_HEADER_FINDING(kCellsGrid, cells, "the grid of cells is out of range, or there where there is none");
+  const double origin[] = {std::bit_cast<double>(header.origin_x), std::bit_cast<double>(header.origin_y),
+                           std::bit_cast<double>(header.origin_z)};
+  for (double x : origin)
+    if (!std::isfinite(x)) {
+      LSP_HEADER_FINDING(kOriginNotFinite, origin_x, "the origin is not finite");
+      break;
+    }
+  for (uint32_t dial : header.quality)
+    if ((dial & 0xFF) > LSP_LOSS_UNKNOWN + 1 || dial >> 8 > LSP_LOSS_UNKNOWN + 1 || (dial != 0 && !has_cells(header))) {
+      LSP_HEADER_FINDING(kQualityRange, quality, "is " + hex(dial));
+      break;
+    }
+}
+
 void check_base(const LspHeader& header, Report& report) {
   const bool ntree = header.base_structure == LSP_BASE_NTREE;
-  if ((header.base_structure != LSP_BASE_BVH && !ntree) ||
-      ntree != ((header.required_features & LSP_FEATURE_NTREE) != 0))
+  const bool cells = has_cells(header);
+  const uint32_t features = header.required_features & (LSP_FEATURE_NTREE | LSP_FEATURE_CELLS);
+  if ((header.base_structure != LSP_BASE_BVH && !ntree && !cells) ||
+      features != (ntree ? LSP_FEATURE_NTREE : cells ? LSP_FEATURE_CELLS : 0))
     LSP_HEADER_FINDING(kBaseStructure, base_structure,
-                       "is " + std::to_string(header.base_structure) + " with the feature bit NTREE " +
-                           (header.required_features & LSP_FEATURE_NTREE ? "set" : "clear"));
+                       "is " + std::to_string(header.base_structure) + " with the feature bits NTREE " +
+                           (features & LSP_FEATURE_NTREE ? "set" : "clear") + " and CELLS " +
+                           (features & LSP_FEATURE_CELLS ? "set" : "clear"));
   const lsp_float3& lo = header.ntree_lo;
   const bool zero = header.ntree_branching == 0 && header.ntree_depth == 0 && header.cell_count == 0 &&
                     header.reference_count == 0 && lo.x == 0 && lo.y == 0 && lo.z == 0 &&
@@ -118,6 +148,7 @@ void check_base(const LspHeader& header, Report& report) {
                            std::to_string(header.ntree_depth) + ", or what is stated of cells, do not fit " +
                            "base structure " + std::to_string(header.base_structure));
   if (ntree) check_cube(header, report);
+  check_grid(header, report);
 }
 
 void check_limits(const LspHeader& header, Report& report) {
@@ -161,8 +192,10 @@ void check_numbers(const LspHeader& header, Report& report) {
   if (!(header.plane_tolerance >= 0.0f && std::isfinite(header.plane_tolerance)))
     LSP_HEADER_FINDING(kTolerances, plane_tolerance, "is " + std::to_string(header.plane_tolerance));
   bool zero = header.reserved_0 == 0;
-  for (uint32_t word : header.reserved) zero = zero && word == 0;
-  if (!zero) LSP_HEADER_FINDING(kReservedNotZero, reserved, "reserved_0 or reserved is not zero");
+  for (uint32_t word : header.reserved_1) zero = zero && word == 0;
+  for (uint32_t word : header.cells.reserved) zero = zero && word == 0;
+  zero = zero && header.reserved_2 == 0;
+  if (!zero) LSP_HEADER_FINDING(kReservedNotZero, reserved_1, "a reserved field is not zero");
 }
 
 void check_length(const FileView& view, Report& report) {

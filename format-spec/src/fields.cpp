@@ -77,7 +77,31 @@ struct Fields<LspHeader> {
                                    LSP_FIELD(ntree_lo),
                                    LSP_FIELD(ntree_size),
                                    LSP_FIELD(ntree_margin),
-                                   LSP_FIELD(reserved)};
+                                   LSP_FIELD(reserved_1),
+                                   LSP_FIELD(cells.lo),
+                                   LSP_FIELD(cells.size),
+                                   LSP_FIELD(cells.cells_x),
+                                   LSP_FIELD(cells.cells_y),
+                                   LSP_FIELD(cells.cells_z),
+                                   LSP_FIELD(cells.per_size),
+                                   LSP_FIELD(cells.margin),
+                                   LSP_FIELD(cells.box_step),
+                                   LSP_FIELD(cells.far_patches),
+                                   LSP_FIELD(cells.origin_patches),
+                                   LSP_FIELD(cells.sub_cells),
+                                   LSP_FIELD(cells.origin_entry_first),
+                                   LSP_FIELD(cells.reserved),
+                                   LSP_FIELD(origin_x),
+                                   LSP_FIELD(origin_y),
+                                   LSP_FIELD(origin_z),
+                                   LSP_FIELD(filled_cell_count),
+                                   LSP_FIELD(entry_word_count),
+                                   LSP_FIELD(plane_count),
+                                   LSP_FIELD(split_count),
+                                   LSP_FIELD(cell_node_count),
+                                   LSP_FIELD(cell_reference_count),
+                                   LSP_FIELD(quality),
+                                   LSP_FIELD(reserved_2)};
 };
 
 template <>
@@ -143,6 +167,33 @@ struct Fields<LspBitWord> {
   static constexpr Field list[] = {LSP_FIELD(bits), LSP_FIELD(offset)};
 };
 
+template <>
+struct Fields<LspFilledCell> {
+  using Owner = LspFilledCell;
+  static constexpr Field list[] = {LSP_FIELD(sub_mask_lo), LSP_FIELD(sub_mask_hi), LSP_FIELD(sub_first),
+                                   LSP_FIELD(reserved),    LSP_FIELD(plane_first), LSP_FIELD(plane_count),
+                                   LSP_FIELD(split_first), LSP_FIELD(split_count), LSP_FIELD(root),
+                                   LSP_FIELD(node_first),  LSP_FIELD(reference_first), LSP_FIELD(max_steps)};
+};
+
+template <>
+struct Fields<LspPlane> {
+  using Owner = LspPlane;
+  static constexpr Field list[] = {LSP_FIELD(normal), LSP_FIELD(distance)};
+};
+
+template <>
+struct Fields<LspSplit> {
+  using Owner = LspSplit;
+  static constexpr Field list[] = {LSP_FIELD(answers), LSP_FIELD(weights)};
+};
+
+template <>
+struct Fields<LspCellNode> {
+  using Owner = LspCellNode;
+  static constexpr Field list[] = {LSP_FIELD(box_0), LSP_FIELD(box_1), LSP_FIELD(box_2), LSP_FIELD(children)};
+};
+
 // Every byte of a struct belongs to one field: the table forgets none.
 template <class T>
 constexpr Struct describe(const char* name) {
@@ -159,7 +210,8 @@ constexpr bool complete() {
 }
 static_assert(complete<LspHeader>() && complete<LspSection>() && complete<LspNode>() && complete<LspCell>() &&
               complete<LspTriangle>() && complete<LspCornerNormals>() && complete<LspMaterial>() &&
-              complete<LspLineSpace>() && complete<LspBitWord>());
+              complete<LspLineSpace>() && complete<LspBitWord>() && complete<LspFilledCell>() && complete<LspPlane>() &&
+              complete<LspSplit>() && complete<LspCellNode>());
 
 constexpr Struct kStructs[] = {
     describe<LspHeader>("LspHeader"),     describe<LspSection>("LspSection"),
@@ -167,6 +219,8 @@ constexpr Struct kStructs[] = {
     describe<LspTriangle>("LspTriangle"), describe<LspCornerNormals>("LspCornerNormals"),
     describe<LspMaterial>("LspMaterial"), describe<LspLineSpace>("LspLineSpace"),
     describe<LspBitWord>("LspBitWord"),
+    describe<LspFilledCell>("LspFilledCell"), describe<LspPlane>("LspPlane"),
+    describe<LspSplit>("LspSplit"),       describe<LspCellNode>("LspCellNode"),
 };
 
 template <class T>

@@ -35,6 +35,9 @@ void check_ntree_geometry(const FileView& view, Report& report);
 // Of either base structure, exact: needs leaves in order, and Line Spaces with words of their own.
 void check_conservative(const FileView& view, Report& report);
 
+// Needs every section of cells to be usable, and a grid in range.
+void check_cells(const FileView& view, Report& report);
+
 // Whether all three components are.
 inline bool finite(const lsp_float3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);

@@ -76,6 +76,8 @@ const char* to_string(Layer layer) {
       return "metadata";
     case Layer::kSource:
       return "source";
+    case Layer::kCell:
+      return "cell";
   }
   return "";
 }

@@ -20,6 +20,7 @@ enum class Layer {
   kGeometry,
   kMetadata,
   kSource,
+  kCell,
 };
 // What a broken rule of severity fatal or error says about the file.
 enum class Verdict { kValid, kInvalid, kUnsupported, kLimit, kDiffer };

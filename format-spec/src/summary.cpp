@@ -205,6 +205,8 @@ Json summarize(std::span<const std::byte> file, const std::string& name, uint64_
       {"triangles", header.line_space_triangles},  {"normal_angle_cos", header.normal_angle_cos},
       {"plane_tolerance", header.plane_tolerance}, {"alignment", header.alignment},
       {"ntree_branching", header.ntree_branching}, {"ntree_depth", header.ntree_depth}};
+  json["origin"] = {std::bit_cast<double>(header.origin_x), std::bit_cast<double>(header.origin_y),
+                    std::bit_cast<double>(header.origin_z)};
   json["bounds"] = {{"min", vec(header.bounds_min)}, {"max", vec(header.bounds_max)}};
   json["counts"] = {{"primitives", header.primitive_count}, {"triangles", header.triangle_count},
                     {"nodes", header.node_count},           {"line_spaces", header.line_space_count},

@@ -16,6 +16,8 @@ namespace lsp::format {
 
 // Whether the header says that the tree is an NTree with parameters in range: GRID can be read.
 bool ntree_readable(const LspHeader& header);
+// Whether the grid of cells is in range: CGRD can be read.
+bool cells_readable(const LspHeader& header);
 
 // How many elements the header says that a section has; nothing for META, and for GRID where the header's
 // parameters are out of range.

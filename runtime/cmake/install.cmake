@@ -9,7 +9,7 @@ install(FILES
   ${CMAKE_SOURCE_DIR}/format-spec/include/lsp/layout.h ${CMAKE_SOURCE_DIR}/format-spec/include/lsp/sections.def
   ${CMAKE_SOURCE_DIR}/format-spec/include/lsp/program.h
   include/lsp/interface.h include/lsp/lsp.h include/lsp/lsp_vulkan.h include/lsp/scene_file.hpp include/lsp/lsp.glsl
-  include/lsp/lsp_addresses.glsl include/lsp/lsp_descriptors.glsl
+  include/lsp/lsp_addresses.glsl include/lsp/lsp_descriptors.glsl include/lsp/cells.h
   include/lsp/traverse.h include/lsp/empty_margin.h include/lsp/parts.h include/lsp/bvh.h include/lsp/ntree.h
   DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/lsp COMPONENT runtime)
 

@@ -3,6 +3,7 @@
 #include <bit>
 #include <cmath>
 #include <cstddef>
+#include <cstring>
 
 #include "error.h"
 
@@ -12,6 +13,7 @@ static_assert(std::endian::native == std::endian::little);
 namespace lsp {
 namespace {
 
+using format::has_cells;
 using format::is_ntree;
 using format::Kind;
 using format::kKinds;
@@ -62,14 +64,37 @@ lsp_status check_ntree(const LspHeader& header, lsp_error* error) {
               header.ntree_branching, header.ntree_depth, header.base_structure);
 }
 
+// The grid of cells, whose numbers the traversal computes with.
+lsp_status check_cells(const LspHeader& header, lsp_error* error) {
+  const LspCellGrid& g = header.cells;
+  constexpr LspCellGrid kNone{};
+  bool good = memcmp(&g, &kNone, sizeof g) == 0;
+  if (has_cells(header)) {
+    const auto within = [](uint32_t n, uint32_t most) { return n >= 1 && n <= most; };
+    const auto positive = [](float x) { return x > 0 && std::isfinite(x); };
+    good = within(g.cells_x, LSP_MAX_CELLS) && within(g.cells_y, LSP_MAX_CELLS) && within(g.cells_z, LSP_MAX_CELLS) &&
+           finite(g.lo) && positive(g.size) && positive(g.per_size) && positive(g.margin) && positive(g.box_step) &&
+           within(g.far_patches, LSP_MAX_CELL_PATCHES) && within(g.origin_patches, LSP_MAX_CELL_PATCHES) &&
+           within(g.sub_cells, LSP_MAX_SUB_CELLS) && header.filled_cell_count < LSP_CELL_FILLED;
+  }
+  if (good) return LSP_OK;
+  return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, cells),
+              "states a grid of %u x %u x %u cells that does not fit base structure %u", g.cells_x, g.cells_y,
+              g.cells_z, header.base_structure);
+}
+
 lsp_status check_limits(const LspHeader& header, lsp_error* error) {
   if (!std::has_single_bit(header.alignment) || header.alignment < kPackedAlignment ||
       header.alignment > kMaxAlignment) {
     return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, alignment),
                 "states an alignment of %u, not 256, 4096 or 65536", header.alignment);
   }
-  const bool ntree = (header.required_features & LSP_FEATURE_NTREE) != 0;
-  if (header.base_structure != (ntree ? LSP_BASE_NTREE : LSP_BASE_BVH)) {
+  const uint32_t features = header.required_features & (LSP_FEATURE_NTREE | LSP_FEATURE_CELLS);
+  const uint32_t base = features == LSP_FEATURE_NTREE   ? LSP_BASE_NTREE
+                        : features == LSP_FEATURE_CELLS ? LSP_BASE_CELLS
+                        : features == 0                 ? LSP_BASE_BVH
+                                                        : 0;
+  if (header.base_structure != base) {
     return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, base_structure),
                 "states base structure %u, which its features contradict", header.base_structure);
   }
@@ -83,6 +108,7 @@ lsp_status check_limits(const LspHeader& header, lsp_error* error) {
                 "needs a stack of %u entries, the limit is %u", header.max_stack, LSP_MAX_STACK);
   }
   if (const lsp_status status = check_ntree(header, error); status != LSP_OK) return status;
+  if (const lsp_status status = check_cells(header, error); status != LSP_OK) return status;
   // Every node and leaf is visited once at most, so a loop bounded by this ends soon even where nodes form a
   // ring.
   const uint64_t steps = is_ntree(header) ? lsp_ntree_steps(&header) : 2 * uint64_t{header.node_count};

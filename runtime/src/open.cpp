@@ -1,3 +1,5 @@
+#include <cstring>
+
 #include "container.h"
 #include "error.h"
 
@@ -10,6 +12,12 @@ const T* array(const void* bytes, const LspSection* section) {
 }
 
 }  // namespace
+
+extern "C" void lsp_scene_origin(const lsp_scene* scene, double origin[3]) {
+  const LspHeader& h = *scene->header;
+  const uint64_t bits[] = {h.origin_x, h.origin_y, h.origin_z};
+  memcpy(origin, bits, sizeof bits);
+}
 
 extern "C" lsp_status lsp_open(const void* bytes, uint64_t size, lsp_scene* scene, lsp_error* error) {
   *scene = {};

@@ -1,5 +1,6 @@
 // The CPU tracer: checks what is asked for and hands the rays to the loop for it.
 #include "lsp/lsp.h"
+#include "trace_cells.h"
 #include "trace_loops.h"
 
 namespace {
@@ -14,13 +15,29 @@ lsp_status refuse(lsp_error* error, const char* message) {
 
 }  // namespace
 
+extern "C" uint32_t lsp_dial(const lsp_scene* scene, const lsp_trace_options* options) {
+  // Without their triangles cells answer from tables alone.
+  if (scene->cell_nodes == nullptr) return LSP_DIAL_TABLES;
+  if ((options->flags & LSP_TRACE_MAX_LOSS) == 0)
+    return scene->header->quality[options->quality < LSP_QUALITY_COUNT ? options->quality : LSP_QUALITY_BALANCED];
+  uint32_t classes = options->max_loss > 0 ? 1 : 0;
+  constexpr float kClasses[] = {1, 2, 5, 10, 20};  // per cent: what the first classes lose at most
+  for (const float limit : kClasses) classes += options->max_loss >= limit ? 1 : 0;
+  return options->max_loss >= 100 ? LSP_DIAL_TABLES : LSP_DIAL(classes, classes);
+}
+
 extern "C" lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options* options, const LspRay* rays,
                                 LspHit* hits, uint64_t count, lsp_trace_counts* counts, lsp_error* error) {
   const uint32_t features = scene->header->required_features;
   const bool approximate =
-      (options->flags & LSP_TRACE_APPROXIMATE) != 0 && (features & LSP_FEATURE_LINE_SPACES) != 0;
+      (options->flags & LSP_TRACE_APPROXIMATE) != 0 && (features & (LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS)) != 0;
   if (!approximate && !(features & LSP_FEATURE_EXACT))
     return refuse(error, "the file has no exact tree, trace it approximately or bake it without --no-exact");
+  if (approximate && (features & LSP_FEATURE_CELLS) != 0) {
+    lsp::trace_cells(*scene, (options->flags & LSP_TRACE_ANY_HIT) != 0, lsp_dial(scene, options), rays, hits, count,
+                     counts);
+    return LSP_OK;
+  }
   uint32_t flags = options->flags & (approximate ? lsp::kApproximateFlags : lsp::kExactFlags);
   constexpr uint32_t kConservative = LSP_FEATURE_LINE_SPACES | LSP_FEATURE_BINARY;  // what such a file has
   if ((features & kConservative) != kConservative) flags &= ~LSP_TRACE_SKIP_EMPTY;

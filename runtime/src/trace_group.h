@@ -39,7 +39,7 @@ __attribute__((noinline)) typename Traversal::LspTraced trace_far(const lsp_scen
                                                                   const typename Traversal::LspSetup& s,
                                                                   float lod, const LspRay& ray) {
   Traversal traversal;
-  return traversal.lsp_trace_ready(scene, s, {kFlags, lod, true}, ray);
+  return traversal.lsp_trace_ready(scene, s, {kFlags, lod, true, 0}, ray);
 }
 
 template <class Traced>
@@ -51,6 +51,9 @@ LSP_INLINE inline void add(lsp_trace_counts* sums, const Traced& traced) {
   sums->nodes += traced.counts.nodes;
   sums->shafts += traced.counts.shafts;
   sums->triangles += traced.counts.triangles;
+  sums->splits += traced.counts.splits;
+  sums->exact += traced.counts.exact;
+  sums->exact_nodes += traced.counts.exact_nodes;
 }
 
 template <class Traversal, uint32_t kFlags>
@@ -62,7 +65,7 @@ LSP_CLONES void trace_singly(const lsp_scene& scene, float lod, const LspRay* ra
     const auto traced = !s.valid ? Traversal::lsp_invalid_ray()
                         : Traversal::lsp_is_far(scene, s)
                             ? trace_far<Traversal, kFlags>(scene, s, lod, rays[i])
-                            : traversal.lsp_trace_ready(scene, s, {kFlags, lod, false}, rays[i]);
+                            : traversal.lsp_trace_ready(scene, s, {kFlags, lod, false, 0}, rays[i]);
     hits[i] = traced.hit;
     add(counts, traced);
   }
@@ -122,7 +125,7 @@ template <class Traversal, uint32_t kFlags>
 LSP_CLONES void trace_group(const lsp_scene& scene, float lod, const LspRay* rays, LspHit* hits,
                             uint64_t count, lsp_trace_counts* counts) {
   using Ray = Waiting<Traversal>;
-  const typename Traversal::LspQuery q{kFlags, lod, false};
+  const typename Traversal::LspQuery q{kFlags, lod, false, 0};
   Ray group[kGroup];
   static_assert(sizeof group <= 20 * 1024);
   // Numbers of rays of the group: those that go on, and what those wait for that went on.

@@ -29,6 +29,7 @@ using glm::ivec3;
 using glm::uvec4;
 using glm::vec2;
 using glm::vec3;
+using glm::vec4;
 using uint = uint32_t;
 using LspScene = const lsp_scene&;
 
@@ -40,6 +41,7 @@ inline int findLSB(uint x) { return x == 0 ? -1 : std::countr_zero(x); }
 inline int bitCount(uint x) { return std::popcount(x); }
 inline float abs(float x) { return std::fabs(x); }
 inline vec3 abs(const vec3& v) { return {std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)}; }
+inline float floor(float x) { return std::floor(x); }
 inline float sqrt(float x) { return std::sqrt(x); }
 
 template <typename T>
@@ -76,6 +78,32 @@ LSP_INLINE inline const LspCell& lsp_load_cell(LspScene scene, uint i) {
 }
 LSP_INLINE inline uint lsp_load_reference(LspScene scene, uint i) {
   return at(scene.references, i, scene.header->reference_count);
+}
+
+
+LSP_FN uint lsp_load_cell_word(LspScene scene, uint i) {
+  const LspCellGrid& grid = scene.header->cells;
+  return at(scene.cell_words, i, grid.cells_x * grid.cells_y * grid.cells_z);
+}
+LSP_FN uint lsp_load_entry(LspScene scene, uint i) {
+  return at(scene.entries, i >> 1u, scene.header->entry_word_count) >> ((i & 1u) * 16u) & 0xFFFFu;
+}
+// Of a filled cell, which a shader reads in parts: its origin tables, its answers, its tree.
+LSP_FN const LspFilledCell& lsp_load_cell_origins(LspScene scene, uint i) {
+  return at(scene.filled_cells, i, scene.header->filled_cell_count);
+}
+LSP_FN const LspFilledCell& lsp_load_cell_answers(LspScene scene, uint i) { return lsp_load_cell_origins(scene, i); }
+LSP_FN const LspFilledCell& lsp_load_cell_tree(LspScene scene, uint i) { return lsp_load_cell_origins(scene, i); }
+LSP_FN const LspSplit& lsp_load_split(LspScene scene, uint i) { return at(scene.splits, i, scene.header->split_count); }
+LSP_FN const LspPlane& lsp_load_plane(LspScene scene, uint i) { return at(scene.planes, i, scene.header->plane_count); }
+LSP_FN uint lsp_load_plane_record(LspScene scene, uint i) {
+  return at(scene.plane_records, i, scene.header->plane_count);
+}
+LSP_FN const LspCellNode& lsp_load_cell_node(LspScene scene, uint i) {
+  return at(scene.cell_nodes, i, scene.header->cell_node_count);
+}
+LSP_FN uint lsp_load_cell_reference(LspScene scene, uint i) {
+  return at(scene.cell_references, i, scene.header->cell_reference_count);
 }
 
 // Asks for an element that is read later. It need not be there.

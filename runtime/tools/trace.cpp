@@ -27,6 +27,8 @@ struct Options {
   std::string device;
   bool skip_empty = false;
   float lod = 0;
+  std::string quality = "balanced";
+  float max_loss = -1;  // negative: the quality's
   uint32_t repeats = 1;
   uint32_t threads = std::max(1u, std::thread::hardware_concurrency());
   CommonOptions common;
@@ -51,6 +53,12 @@ void define(CLI::App& app, Options& options) {
          "--lod", options.lod,
          "Stop at a Line Space once its diagonal is under THETA times the distance; 0: only at the deepest")
       ->check(CLI::Range(0.0f, 1e6f));
+  app.add_option("--quality", options.quality, "Cells: a point of the dial that the bake measured and the file states")
+      ->check(CLI::IsMember({"fast", "balanced", "accurate"}));
+  app.add_option("--max-loss", options.max_loss,
+                 "Cells: trace exactly where entries lose more, in per cent; 100: tables alone, 0: every cell exactly; without it "
+                 "--quality says")
+      ->check(CLI::Range(0.0f, 100.0f));
   app.add_option("--near", options.near, "How to answer where a Line Space's node holds the ray's origin")
       ->check(CLI::IsMember({"exact", "skip", "approximate"}));
   app.add_flag("--skip-empty", options.skip_empty,
@@ -74,7 +82,7 @@ double per(double sum, uint64_t count) { return count == 0 ? 0.0 : sum / static_
 
 TraceRequest make_request(const Options& options, const LspHeader& header) {
   TraceRequest request;
-  const bool line_spaces = (header.required_features & LSP_FEATURE_LINE_SPACES) != 0;
+  const bool line_spaces = (header.required_features & (LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS)) != 0;
   const bool approximate = options.mode.empty() ? line_spaces : options.mode == "approximate";
   if (approximate) request.options.flags |= LSP_TRACE_APPROXIMATE;
   if (options.query == "any") request.options.flags |= LSP_TRACE_ANY_HIT;
@@ -82,6 +90,13 @@ TraceRequest make_request(const Options& options, const LspHeader& header) {
   if (options.near == "skip") request.options.flags |= LSP_TRACE_NEAR_SKIP;
   if (options.skip_empty) request.options.flags |= LSP_TRACE_SKIP_EMPTY;
   request.options.lod = options.lod;
+  request.options.quality = options.quality == "fast"       ? LSP_QUALITY_FAST
+                            : options.quality == "accurate" ? LSP_QUALITY_ACCURATE
+                                                            : LSP_QUALITY_BALANCED;
+  if (options.max_loss >= 0) {
+    request.options.flags |= LSP_TRACE_MAX_LOSS;
+    request.options.max_loss = options.max_loss;
+  }
   request.vulkan = options.backend == "vulkan";
   request.repeats = options.repeats;
   request.threads = options.threads;
@@ -122,6 +137,15 @@ nlohmann::ordered_json to_json(const Options& options, const TraceRequest& reque
   json["bytes_imported"] = report.bytes_imported;
   json["bytes_uploaded"] = report.bytes_uploaded;
   json["retraced"] = report.retraced;
+  if ((file.scene().header->required_features & LSP_FEATURE_CELLS) != 0) {
+    json["quality"] = options.quality;
+    if (options.max_loss >= 0) json["max_loss"] = options.max_loss;
+    json["steps_per_ray"] = per(static_cast<double>(counts.nodes), counts.rays);
+    json["lookups_per_ray"] = per(static_cast<double>(counts.shafts), counts.rays);
+    json["splits_per_ray"] = per(static_cast<double>(counts.splits), counts.rays);
+    json["exact_calls_per_ray"] = per(static_cast<double>(counts.exact), counts.rays);
+    json["exact_nodes_per_ray"] = per(static_cast<double>(counts.exact_nodes), counts.rays);
+  }
   json["nodes_per_ray"] = per(static_cast<double>(counts.nodes), counts.rays);
   json["shafts_per_ray"] = per(static_cast<double>(counts.shafts), counts.rays);
   json["triangles_per_ray"] = per(static_cast<double>(counts.triangles), counts.rays);

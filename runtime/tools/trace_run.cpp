@@ -28,6 +28,9 @@ void add(lsp_trace_counts& sum, const lsp_trace_counts& other) {
   sum.nodes += other.nodes;
   sum.shafts += other.shafts;
   sum.triangles += other.triangles;
+  sum.splits += other.splits;
+  sum.exact += other.exact;
+  sum.exact_nodes += other.exact_nodes;
 }
 
 // One line on standard error, rewritten at most five times a second, once a second has passed.

@@ -9,11 +9,12 @@ struct Wanted {
   uint32_t binding;
   uint32_t section;
   uint32_t uses;  // any of these asks for it
+  uint32_t base;  // of its base structure, 0: any
 };
 constexpr Wanted kWanted[] = {
 #define LSP_ARRAY_SECTION(Name, TYPE, code, Element, flag, base, feature, owed, member, counter, per, uses, \
                           binding)                                                                          \
-  {binding, LSP_SECTION_##TYPE, uses},
+  {binding, LSP_SECTION_##TYPE, uses, base},
 #include "lsp/sections.def"
 };
 
@@ -36,12 +37,13 @@ extern "C" lsp_status lsp_vulkan_plan_buffers(const lsp_scene* scene, uint32_t u
   if ((uses & LSP_USE_EXACT) != 0 && (features & LSP_FEATURE_EXACT) == 0) {
     return lsp::fail(error, LSP_ERROR_UNSUPPORTED, 0, "has no exact tree; trace it approximately");
   }
-  if ((uses & LSP_USE_APPROXIMATE) != 0 && (features & (LSP_FEATURE_EXACT | LSP_FEATURE_LINE_SPACES)) == 0) {
-    return lsp::fail(error, LSP_ERROR_UNSUPPORTED, 0, "has neither Line Spaces nor an exact tree");
+  if ((uses & LSP_USE_APPROXIMATE) != 0 && (features & (LSP_FEATURE_EXACT | LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS)) == 0) {
+    return lsp::fail(error, LSP_ERROR_UNSUPPORTED, 0, "has neither tables nor an exact tree");
   }
   if ((uses & LSP_USE_MATERIALS) != 0 && (features & LSP_FEATURE_MATERIALS) == 0) {
     return lsp::fail(error, LSP_ERROR_UNSUPPORTED, 0, "has no materials");
   }
+  const bool cells = scene->header->base_structure == LSP_BASE_CELLS;
   plan->buffers[0] = {LSP_BINDING_HEADER, 0, 0, sizeof(LspHeader)};
   plan->buffer_count = 1;
   plan->bytes = sizeof(LspHeader);
@@ -49,6 +51,8 @@ extern "C" lsp_status lsp_vulkan_plan_buffers(const lsp_scene* scene, uint32_t u
   plan->addresses = (uses & LSP_USE_ADDRESSES_ALWAYS) != 0 ? 1 : 0;
   for (const Wanted& wanted : kWanted) {
     if ((uses & wanted.uses) == 0) continue;
+    // Approximate rays of cells never see the BVH.
+    if (cells && wanted.base == LSP_BASE_BVH && (uses & LSP_USE_EXACT) == 0) continue;
     const LspSection* section = find_section(*scene, wanted.section);
     if (section == nullptr || section->bytes == 0) continue;
     const auto* name = reinterpret_cast<const char*>(&section->type);

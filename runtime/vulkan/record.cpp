@@ -29,16 +29,31 @@ constexpr uint32_t kNTreeAddressesCount[] =
 #include "trace_ntree_addresses_count.spv.inc"
     ;
 
+constexpr uint32_t kCells[] =
+#include "trace_cells.spv.inc"
+    ;
+constexpr uint32_t kCellsCount[] =
+#include "trace_cells_count.spv.inc"
+    ;
+constexpr uint32_t kCellsAddresses[] =
+#include "trace_cells_addresses.spv.inc"
+    ;
+constexpr uint32_t kCellsAddressesCount[] =
+#include "trace_cells_addresses_count.spv.inc"
+    ;
+
 struct Spirv {
   const uint32_t* words;
   size_t bytes;
 };
 // By base structure, addresses, counting.
-constexpr Spirv kShaders[2][2][2] = {
+constexpr Spirv kShaders[3][2][2] = {
     {{{kBvh, sizeof kBvh}, {kBvhCount, sizeof kBvhCount}},
      {{kBvhAddresses, sizeof kBvhAddresses}, {kBvhAddressesCount, sizeof kBvhAddressesCount}}},
     {{{kNTree, sizeof kNTree}, {kNTreeCount, sizeof kNTreeCount}},
-     {{kNTreeAddresses, sizeof kNTreeAddresses}, {kNTreeAddressesCount, sizeof kNTreeAddressesCount}}}};
+     {{kNTreeAddresses, sizeof kNTreeAddresses}, {kNTreeAddressesCount, sizeof kNTreeAddressesCount}}},
+    {{{kCells, sizeof kCells}, {kCellsCount, sizeof kCellsCount}},
+     {{kCellsAddresses, sizeof kCellsAddresses}, {kCellsAddressesCount, sizeof kCellsAddressesCount}}}};
 
 template <class Function>
 bool load(VkDevice device, PFN_vkGetDeviceProcAddr get, const char* name, Function* function) {
@@ -80,7 +95,8 @@ extern "C" void lsp_vulkan_record_upload_barrier(const lsp_vulkan_functions* fun
 }
 
 extern "C" const uint32_t* lsp_vulkan_trace_spirv(const lsp_vulkan_plan* plan, int counting, size_t* bytes) {
-  const Spirv& shader = kShaders[plan->base_structure == LSP_BASE_NTREE][plan->addresses != 0][counting != 0];
+  const uint32_t base = plan->base_structure - LSP_BASE_BVH;
+  const Spirv& shader = kShaders[base < 3 ? base : 0][plan->addresses != 0][counting != 0];
   *bytes = shader.bytes;
   return shader.words;
 }
@@ -90,7 +106,7 @@ extern "C" void lsp_vulkan_address_table(const lsp_vulkan_plan* plan, const VkDe
   for (uint32_t i = 0; i < LSP_VULKAN_ADDRESS_COUNT; ++i) table[i] = 0;
   for (uint32_t i = 0; i < plan->buffer_count; ++i) {
     const uint32_t binding = plan->buffers[i].binding;
-    if (binding >= LSP_BINDING_NODES && binding <= LSP_BINDING_REFERENCES) {
+    if (binding >= LSP_BINDING_NODES && binding <= LSP_BINDING_CELL_NODES) {
       table[binding - LSP_BINDING_NODES] = buffer_addresses[i];
     }
   }

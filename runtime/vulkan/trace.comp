@@ -1,6 +1,6 @@
 // One ray per invocation: rays from a buffer, hits into another. With LSP_COUNT defined, sums of the work done
 // are added to the counters. With LSP_ADDRESSES defined, the sections are read through buffer device addresses; with
-// LSP_NTREE, the base structure is an NTree.
+// LSP_NTREE, the base structure is an NTree; with LSP_CELLS, cells answer.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #ifdef LSP_ADDRESSES
@@ -41,7 +41,7 @@ void main() {
   uvec4 b = ray_words[2u * index + 1u];
   LspRay ray = LspRay(uintBitsToFloat(a.xyz), uintBitsToFloat(a.w), uintBitsToFloat(b.xyz), uintBitsToFloat(b.w));
 
-  LspTraced traced = lsp_trace_ray(lsp_bound_scene(), ray, kFlags, constants.lod);
+  LspTraced traced = lsp_trace_ray(lsp_bound_scene(), ray, kFlags, constants.lod, constants.dial);
   LspHit hit = traced.hit;
 #ifdef LSP_COUNT
   if ((hit.flags & LSP_HIT_INCOMPLETE) == 0u) {  // an incomplete ray is traced, and counted, again
@@ -50,6 +50,9 @@ void main() {
     add(LSP_COUNTER_NODES, traced.counts.nodes);
     add(LSP_COUNTER_SHAFTS, traced.counts.shafts);
     add(LSP_COUNTER_TRIANGLES, traced.counts.triangles);
+    add(LSP_COUNTER_SPLITS, traced.counts.splits);
+    add(LSP_COUNTER_EXACT, traced.counts.exact);
+    add(LSP_COUNTER_EXACT_NODES, traced.counts.exact_nodes);
   }
 #endif
 

@@ -176,9 +176,11 @@ class Pipelines {
   Pipelines& operator=(const Pipelines&) = delete;
   VkPipeline get(bool counting, uint32_t flags) {
     VkPipeline& pipeline = made_[{counting, flags}];
-    if (pipeline == VK_NULL_HANDLE)
-      pipeline = shader_.create_pipeline(plan_, counting, flags, stack_, parts_);
-    return pipeline;
+    if (pipeline != VK_NULL_HANDLE) return pipeline;
+    lsp_vulkan_plan plan = plan_;
+    if (plan.base_structure == LSP_BASE_CELLS && (flags & LSP_TRACE_APPROXIMATE) == 0)
+      plan.base_structure = LSP_BASE_BVH;
+    return pipeline = shader_.create_pipeline(plan, counting, flags, stack_, parts_);
   }
 
  private:
@@ -262,6 +264,7 @@ class VulkanTracer::Impl {
   VulkanOptions options_;
   lsp_scene scene_{};
   uint32_t uses_ = 0;
+  uint32_t dial_ = 0;  // of the trace in progress
   std::unique_ptr<Shader> shader_;
   std::unique_ptr<Pipelines> pipelines_;
   Buffer counters_;
@@ -296,7 +299,7 @@ void VulkanTracer::Impl::attach(SceneBuffers&& buffers) {
   const LspRay ray{header.bounds_min, 0.0f, {1.0f, 1.0f, 1.0f}, 3.402823e38f};
   LspHit hit;
   const uint32_t flags = (uses_ & LSP_USE_EXACT) != 0 ? 0 : LSP_TRACE_APPROXIMATE;
-  trace({flags, 0.0f}, {&ray, 1}, {&hit, 1}, false);
+  trace({flags, 0.0f, 0, 0.0f}, {&ray, 1}, {&hit, 1}, false);
 }
 
 bool VulkanTracer::Impl::try_import(bool forced) {
@@ -358,7 +361,7 @@ void VulkanTracer::Impl::record_batch(const lsp_trace_options& options, uint32_t
     vk.vkCmdResetQueryPool(commands, shader_->timer, 0, 2);
     vk.vkCmdWriteTimestamp(commands, kCompute, shader_->timer, 0);
   }
-  const lsp_vulkan_trace_constants constants{options.lod, 0, count};
+  const lsp_vulkan_trace_constants constants{options.lod, 0, count, dial_};
   lsp_vulkan_record_trace(&device->functions, commands, pipelines_->get(counting, options.flags),
                           shader_->layout, shader_->set, &constants);
   if (shader_->timer != VK_NULL_HANDLE) vk.vkCmdWriteTimestamp(commands, kCompute, shader_->timer, 1);
@@ -403,6 +406,9 @@ void VulkanTracer::Impl::retrace(const lsp_trace_options& options, std::span<con
     result.counts.nodes += counts.nodes;
     result.counts.shafts += counts.shafts;
     result.counts.triangles += counts.triangles;
+    result.counts.splits += counts.splits;
+    result.counts.exact += counts.exact;
+    result.counts.exact_nodes += counts.exact_nodes;
   }
 }
 
@@ -416,6 +422,10 @@ VulkanTrace VulkanTracer::Impl::trace(const lsp_trace_options& wanted, std::span
   constexpr uint32_t kConservative = LSP_FEATURE_LINE_SPACES | LSP_FEATURE_BINARY;  // what such a file has
   if (scene_.header == nullptr || (scene_.header->required_features & kConservative) != kConservative)
     options.flags &= ~LSP_TRACE_SKIP_EMPTY;
+  if (scene_.header != nullptr && (scene_.header->required_features & LSP_FEATURE_CELLS) != 0) {
+    options.flags &= LSP_TRACE_APPROXIMATE | LSP_TRACE_ANY_HIT;
+    dial_ = lsp_dial(&scene_, &wanted);
+  }
   uint32_t needed = (options.flags & LSP_TRACE_APPROXIMATE) != 0 ? LSP_USE_APPROXIMATE : LSP_USE_EXACT;
   if ((options.flags & LSP_TRACE_SKIP_EMPTY) != 0) needed |= LSP_USE_APPROXIMATE;
   if (scene_buffers == nullptr || (uses_ & needed) != needed) {
@@ -448,10 +458,14 @@ VulkanTrace VulkanTracer::Impl::trace(const lsp_trace_options& wanted, std::span
       result.counts.nodes += counts.nodes;
       result.counts.shafts += counts.shafts;
       result.counts.triangles += counts.triangles;
+      result.counts.splits += counts.splits;
+      result.counts.exact += counts.exact;
+      result.counts.exact_nodes += counts.exact_nodes;
     }
     ++result.batches;
   }
   result.counts.rays = rays.size();
+  options.flags |= wanted.flags & LSP_TRACE_MAX_LOSS;
   retrace(options, rays, hits, count, result);
   result.seconds = seconds_since(start);
   return result;

@@ -32,8 +32,8 @@ CheckOptions options_of(const InvalidFile& file) {
     if (file.arguments[i] == "--level") options.level = Level::kGeometry;
     if (file.arguments[i] == "--memory-limit") options.memory_limit = std::stoull(file.arguments[i + 1]);
     if (file.arguments[i] == "--mesh")
-      options.source =
-          hash_sources(std::vector<std::filesystem::path>{kCorpus / "1.0/invalid" / file.arguments[i + 1]}, {});
+      options.source = hash_sources(
+          std::vector<std::filesystem::path>{kCorpus / "2.0/invalid" / file.arguments[i + 1]}, {});
   }
   return options;
 }
@@ -45,16 +45,16 @@ TEST(Corpus, RepositoryHoldsWhatTheProgramMakes) {
   };
   std::set<std::filesystem::path> known;
   for (const ValidFile& file : valid_files()) {
-    const auto path = kCorpus / "1.0/valid" / (file.name + ".lsp");
+    const auto path = kCorpus / "2.0/valid" / (file.name + ".lsp");
     expect_same(path, file.bytes);
     known.insert(path);
   }
   for (const InvalidFile& file : invalid_files()) {
-    const auto path = kCorpus / "1.0/invalid" / (file.name + ".lsp");
+    const auto path = kCorpus / "2.0/invalid" / (file.name + ".lsp");
     expect_same(path, file.bytes);
     known.insert(path);
   }
-  for (const auto& entry : std::filesystem::recursive_directory_iterator(kCorpus / "1.0"))
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(kCorpus / "2.0"))
     EXPECT_TRUE(entry.path().extension() != ".lsp" || known.contains(entry.path())) << entry.path();
 }
 
@@ -92,7 +92,7 @@ TEST(Corpus, EveryRuleHasAFileThatBreaksIt) {
 
 TEST(Corpus, ReportsAreTheExpectedOnes) {
   for (const InvalidFile& file : invalid_files()) {
-    std::ifstream stream(kCorpus / "1.0/invalid" / (file.name + ".json"));
+    std::ifstream stream(kCorpus / "2.0/invalid" / (file.name + ".json"));
     const auto expected = nlohmann::ordered_json::parse(stream, nullptr, false);
     EXPECT_EQ(to_json(check_file(file.bytes, options_of(file))), expected) << file.name;
   }

@@ -24,7 +24,7 @@ void trace(const lsp_scene& scene, const std::string& context) {
   const std::array<LspRay, 16> rays = rays_through(header);
   LspHit hits[16];
   const bool exact = header.required_features & LSP_FEATURE_EXACT;
-  const bool approximate = header.required_features & LSP_FEATURE_LINE_SPACES;
+  const bool approximate = header.required_features & (LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS);
   for (uint32_t flags = 0; flags <= LSP_TRACE_ALL_FLAGS; ++flags) {
     const bool able = exact || (approximate && (flags & LSP_TRACE_APPROXIMATE));
     const lsp_trace_options options{flags, flags & LSP_TRACE_NEAR_APPROXIMATE ? 0.5f : 0.0f};

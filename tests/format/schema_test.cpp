@@ -19,7 +19,7 @@ using namespace lsp;
 using namespace lsp::corpus;
 using Json = nlohmann::json;
 
-const std::filesystem::path kCorpus = std::filesystem::path(LSP_CORPUS_DIR) / "1.0";
+const std::filesystem::path kCorpus = std::filesystem::path(LSP_CORPUS_DIR) / "2.0";
 
 struct Output {
   int exit = -1;

@@ -19,7 +19,7 @@ using namespace lsp::format;
 void expect_same_answers(VulkanTracer& tracer, const lsp_scene& scene, const std::string& context) {
   const std::array<LspRay, 16> rays = rays_through(*scene.header);
   const bool exact = scene.header->required_features & LSP_FEATURE_EXACT;
-  const bool approximate = scene.header->required_features & LSP_FEATURE_LINE_SPACES;
+  const bool approximate = scene.header->required_features & (LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS);
   tracer.load(scene, (exact ? LSP_USE_EXACT : 0u) | (approximate ? LSP_USE_APPROXIMATE : 0u));
   for (uint32_t flags = 0; flags <= LSP_TRACE_ALL_FLAGS; ++flags) {
     if (!(flags & LSP_TRACE_APPROXIMATE ? approximate : exact)) continue;

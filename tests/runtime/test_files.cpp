@@ -107,7 +107,7 @@ TEST_F(Files, ExitCodes) {
   Bytes cut = write_raw(parts);
   cut.resize(cut.size() / 2);
   Bytes newer = write_raw(parts);
-  header_of(newer).version_major = 2;
+  header_of(newer).version_major = LSP_VERSION_MAJOR + 1;
   Bytes damaged = write_packed(parts);
   damaged[section_of(damaged, LSP_SECTION_NODE).offset + 9] ^= 0xFF;
   EXPECT_EQ(exit_of((folder_ / "missing.lsp").string()), Exit::kFile);

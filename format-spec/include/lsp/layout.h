@@ -4,7 +4,7 @@
  * the same offsets under the C ABI and under GLSL's std430; the static assertions below and
  * tests/layout hold both sides to the table of the specification (format-spec/SPEC.md).
  *
- *   file:  | header 256 | section table, 64 each | pad | section | pad | section | ... | pad |
+ *   file:  | header 384 | section table, 64 each | pad | section | pad | section | ... | pad |
  *                                                  ^ every section starts at a multiple of header.alignment
  *
  * All values are little-endian. Offsets are in bytes from the start of the file. Space is the world space of
@@ -36,7 +36,7 @@ typedef struct lsp_float3 {
 #endif
 
 /* Version of the format (not of the programs). A reader refuses another major version. */
-#define LSP_VERSION_MAJOR 1u
+#define LSP_VERSION_MAJOR 2u
 #define LSP_VERSION_MINOR 0u
 
 /* First eight bytes: 89 'L' 'S' 'P' 0D 0A 1A 0A, as two little-endian words. Catches text-mode transfers. */
@@ -52,11 +52,13 @@ typedef struct lsp_float3 {
 #define LSP_FEATURE_MATERIALS 0x8u   /* materials are present (MATL) */
 #define LSP_FEATURE_NTREE 0x10u      /* the base structure is an NTree */
 #define LSP_FEATURE_BINARY 0x20u     /* some Line Space has bits but no candidates */
-#define LSP_FEATURES_KNOWN 0x3Fu
+#define LSP_FEATURE_CELLS 0x40u      /* approximate rays are answered by cells */
+#define LSP_FEATURES_KNOWN 0x7Fu
 
 /* Base structures. */
 #define LSP_BASE_BVH 1u
 #define LSP_BASE_NTREE 2u
+#define LSP_BASE_CELLS 3u /* cells, and for exact rays a BVH */
 
 #ifndef GL_core_profile
 /* Section types, LSP_SECTION_NODE and so on: four characters each, the first in the low byte. */
@@ -102,18 +104,35 @@ enum {
 #define LSP_MAX_RESOLUTION 32u
 #define LSP_MAX_STACK 96u
 
+/* The grid of cells, part of the header; all zero without cells. */
+LSP_BEGIN(LspCellGrid)
+  LSP_VEC3 lo;    /* lower corner of cell (0, 0, 0) */
+  LSP_FLOAT size; /* edge of a cell */
+  LSP_UINT cells_x;
+  LSP_UINT cells_y;
+  LSP_UINT cells_z;
+  LSP_FLOAT per_size;      /* 1 / size */
+  LSP_FLOAT margin;        /* a cell's tree also holds what comes within this distance of it */
+  LSP_FLOAT box_step;      /* (size + 2 margin) / 255: unit of the boxes in LspCellNode */
+  LSP_UINT far_patches;    /* N: patches along an edge of a cell, of far tables */
+  LSP_UINT origin_patches; /* M: likewise, of origin tables */
+  LSP_UINT sub_cells;      /* along an edge of a cell */
+  LSP_UINT origin_entry_first; /* entries of all far tables */
+  LSP_UINT reserved[2];    /* zero */
+LSP_END(LspCellGrid)
+
 /* The header, at offset 0. Shaders bind it as a buffer; what a shader needs to trace is all here. */
 LSP_BEGIN(LspHeader)
   LSP_UINT magic_0;
   LSP_UINT magic_1;
   LSP_UINT version_major;
   LSP_UINT version_minor;
-  LSP_UINT header_bytes; /* 256 */
+  LSP_UINT header_bytes; /* 384 */
   LSP_UINT section_count;
   LSP_UINT required_features;
   LSP_UINT optional_features;
   LSP_U64 file_bytes;
-  LSP_U64 section_table_offset; /* 256 */
+  LSP_U64 section_table_offset; /* 384 */
   LSP_UINT alignment;           /* of sections and of the file's length: 256, 4096 or 65536 */
   LSP_UINT base_structure;      /* LSP_BASE_* */
   LSP_U64 primitive_count;      /* triangles of the inputs in import order, dropped ones included */
@@ -150,8 +169,30 @@ LSP_BEGIN(LspHeader)
   LSP_VEC3 ntree_lo;        /* lower corner of the root's cube */
   LSP_FLOAT ntree_size;     /* its edge */
   LSP_FLOAT ntree_margin;   /* a cell also holds what comes within this distance of it */
-  LSP_UINT reserved[3];     /* zero */
+  LSP_UINT reserved_1[3];   /* zero */
+  LspCellGrid cells;
+  LSP_U64 origin_x; /* float64: what positions of the file, of rays and of hits are relative to */
+  LSP_U64 origin_y;
+  LSP_U64 origin_z;
+  LSP_UINT filled_cell_count; /* LspFilledCell; this and what follows is zero without cells */
+  LSP_UINT entry_word_count;  /* 32-bit words of CENT */
+  LSP_UINT plane_count;
+  LSP_UINT split_count;
+  LSP_UINT cell_node_count;      /* LspCellNode */
+  LSP_UINT cell_reference_count; /* of CREF */
+  LSP_UINT quality[3]; /* LSP_QUALITY_*: LSP_DIAL of how many classes of loss are heeded */
+  LSP_UINT reserved_2; /* zero */
 LSP_END(LspHeader)
+
+/* Points of the dial between speed and accuracy that the bake measured for the scene: indices of header.quality. */
+#define LSP_QUALITY_BALANCED 0u
+#define LSP_QUALITY_FAST 1u
+#define LSP_QUALITY_ACCURATE 2u
+#define LSP_QUALITY_COUNT 3u
+/* Of origin and of far tables the entries of so many classes of loss are heeded, the lowest ones; where others would
+ * answer, the cell is traced exactly. */
+#define LSP_DIAL(origin_classes, far_classes) ((origin_classes) | (far_classes) << 8u)
+#define LSP_DIAL_TABLES LSP_DIAL(LSP_LOSS_UNKNOWN + 1u, LSP_LOSS_UNKNOWN + 1u) /* nothing is traced exactly */
 
 LSP_BEGIN(LspSection)
   LSP_UINT type;  /* LSP_SECTION_* */
@@ -203,6 +244,75 @@ static inline uint64_t lsp_ntree_steps(const LspHeader* h) {
   return UINT64_C(3) * h->ntree_branching * h->node_count + h->cell_count + h->reference_count;
 }
 #endif
+
+/* ---- cells: equal cubes over the scene, answered from tables ----
+ *
+ * CGRD has a word of every cell of the grid, x fastest: LSP_CELL_FILLED and the number of its record, or its jump:
+ * the cells up to `jump` cells away, along every axis, are empty too. */
+#define LSP_CELL_FILLED 0x80000000u
+#define LSP_CELL_MAX_JUMP 255u
+#define LSP_MAX_CELLS 1024u /* along an edge of the grid */
+#define LSP_MAX_SUB_CELLS 4u
+#define LSP_MAX_CELL_PATCHES 8u
+
+/* A filled cell, in the order of the grid: its origin tables, its answers, and its tree. */
+LSP_BEGIN(LspFilledCell)
+  LSP_UINT sub_mask_lo; /* which sub-cells hold surface, and have an origin table: bit x + n * (y + n * z) */
+  LSP_UINT sub_mask_hi;
+  LSP_UINT sub_first; /* number of the first of its origin tables, which follow one another by their bits */
+  LSP_UINT reserved;  /* zero */
+  LSP_UINT plane_first;
+  LSP_UINT plane_count; /* answers from this on are splits */
+  LSP_UINT split_first;
+  LSP_UINT split_count;
+  LSP_UINT root;            /* of its tree: as in LspCellNode.children */
+  LSP_UINT node_first;      /* its nodes count from here */
+  LSP_UINT reference_first; /* and its leaves' references from here */
+  LSP_UINT max_steps;       /* nodes that an exact trace of the cell visits at most */
+LSP_END(LspFilledCell)
+
+/* CENT has the entries, 16 bits, two in a word, the lower half first: of every filled cell the 30 N^4 shafts of its
+ * far table (LSP_SHAFT_INDEX), then of every origin table, by face 2 * axis + side and patch u + M * v of the cell
+ * through which a ray leaves, 6 M^2. Bits 0-12: the answer, a plane or split of the cell or one of these; 13-15: its
+ * loss, the share of rays that it answers wrongly. */
+#define LSP_ANSWER_MASK 0x1FFFu
+#define LSP_ANSWER_LIMIT 0x1FF0u /* planes and splits of a cell, at most */
+#define LSP_ANSWER_EMPTY 0x1FFFu /* nothing in the cell */
+#define LSP_ANSWER_SKY 0x1FFEu   /* nothing on the whole ray; of origin tables */
+#define LSP_LOSS_SHIFT 13u
+/* Classes of loss: 0: none was seen; then up to 1, 2, 5, 10, 20, 100 per cent. */
+#define LSP_LOSS_UNKNOWN 7u /* too few rays came that way to know */
+
+/* The plane of triangles of a cell. */
+LSP_BEGIN(LspPlane)
+  LSP_VEC3 normal;    /* unit length */
+  LSP_FLOAT distance; /* from the cell's centre along the normal, in edges of a cell */
+LSP_END(LspPlane)
+
+/* Two answers and the linear form over a ray's place in its shaft that chooses. Weights are 6 bits, two's complement.
+ * Places, from -1 to 1: of a far table u and v in the patch of entry, u and v in the patch of exit; of an origin
+ * table x, y, z in the sub-cell, u and v in the patch of exit. */
+LSP_BEGIN(LspSplit)
+  LSP_UINT answers; /* bits 0-11: where the form is positive, 12-23: where not, each a plane of the cell or
+                       LSP_SPLIT_EMPTY; 24-29: the constant */
+  LSP_UINT weights; /* of the places, from bit 0 on */
+LSP_END(LspSplit)
+#define LSP_SPLIT_MASK 0xFFFu
+#define LSP_SPLIT_EMPTY 0xFFFu
+
+/* A node of a cell's tree. Boxes in steps of grid.box_step from the cell's corner less the margin, rounded outwards:
+ * lo x y z, hi x y z of child 0, then of child 1, a byte each. Children, 16 bits each: a node, or with
+ * LSP_CELL_LEAF_BIT a leaf, count - 1 in bits 13-14 and its first reference in bits 0-12; LSP_CELL_NO_CHILD: none. */
+LSP_BEGIN(LspCellNode)
+  LSP_UINT box_0;
+  LSP_UINT box_1;
+  LSP_UINT box_2;
+  LSP_UINT children;
+LSP_END(LspCellNode)
+#define LSP_CELL_LEAF_BIT 0x8000u
+#define LSP_CELL_LEAF_COUNT_SHIFT 13u
+#define LSP_CELL_MAX_REFERENCES 0x2000u
+#define LSP_CELL_NO_CHILD 0xFFFFu
 
 LSP_BEGIN(LspTriangle)
   LSP_VEC3 v0;
@@ -273,10 +383,15 @@ LSP_END(LspBitWord)
 #define LSP_STATIC_ASSERT(condition) _Static_assert(condition, #condition)
 #endif
 #ifdef LSP_STATIC_ASSERT
-LSP_STATIC_ASSERT(sizeof(LspHeader) == 256);
+LSP_STATIC_ASSERT(sizeof(LspCellGrid) == 64);
+LSP_STATIC_ASSERT(sizeof(LspHeader) == 384);
 LSP_STATIC_ASSERT(sizeof(LspSection) == 64);
 LSP_STATIC_ASSERT(sizeof(LspNode) == 64);
 LSP_STATIC_ASSERT(sizeof(LspCell) == 12);
+LSP_STATIC_ASSERT(sizeof(LspFilledCell) == 48);
+LSP_STATIC_ASSERT(sizeof(LspPlane) == 16);
+LSP_STATIC_ASSERT(sizeof(LspSplit) == 8);
+LSP_STATIC_ASSERT(sizeof(LspCellNode) == 16);
 LSP_STATIC_ASSERT(sizeof(LspTriangle) == 48);
 LSP_STATIC_ASSERT(sizeof(LspCornerNormals) == 12);
 LSP_STATIC_ASSERT(sizeof(LspMaterial) == 48);

@@ -47,11 +47,14 @@ LSP_END(LspHit)
  * Spaces, and for rays that begin further than about two extents from the scene, whose rounding the Line
  * Spaces do not cover. */
 #define LSP_TRACE_SKIP_EMPTY 0x10u
-#define LSP_TRACE_ALL_FLAGS 0x1Fu
+#define LSP_TRACE_ALL_FLAGS 0x1Fu /* that a traversal knows */
+
+/* lsp_trace_options.max_loss sets the dial, not its quality. */
+#define LSP_TRACE_MAX_LOSS 0x20u
 
 /* ---- the trace shader ---------------------------------------------------------------------------------- */
 
-/* Bindings of its descriptor set, all storage buffers; 0 to 8 are those of lsp.glsl. */
+/* Bindings of its descriptor set, all storage buffers; 0 to 11 are those of lsp.glsl. */
 #define LSP_BINDING_HEADER 0
 #define LSP_BINDING_NODES 1 /* of an NTree: GRID; of scenes read through addresses: their table */
 #define LSP_BINDING_TRIANGLES 2
@@ -61,14 +64,23 @@ LSP_END(LspHit)
 #define LSP_BINDING_CANDIDATES 6
 #define LSP_BINDING_CELLS 7      /* of an NTree */
 #define LSP_BINDING_REFERENCES 8 /* of an NTree */
-#define LSP_BINDING_RAYS 9       /* LspRay, read */
-#define LSP_BINDING_HITS 10      /* LspHit, written */
-#define LSP_BINDING_COUNTERS 11  /* lsp_trace_counts, added to; only the counting shader uses it */
-#define LSP_BINDING_COUNT 12
-#define LSP_BINDING_NONE 12 /* of MATL's buffer, which the trace shader does not read */
+/* A file of cells has no Line Spaces and no NTree. */
+#define LSP_BINDING_SPLITS 4
+#define LSP_BINDING_PLANES 5
+#define LSP_BINDING_ENTRIES 6
+#define LSP_BINDING_CELL_WORDS 7
+#define LSP_BINDING_CELL_REFERENCES 8
+#define LSP_BINDING_FILLED_CELLS 9
+#define LSP_BINDING_PLANE_RECORDS 10
+#define LSP_BINDING_CELL_NODES 11
+#define LSP_BINDING_RAYS 12     /* LspRay, read */
+#define LSP_BINDING_HITS 13     /* LspHit, written */
+#define LSP_BINDING_COUNTERS 14 /* lsp_trace_counts, added to; only the counting shader uses it */
+#define LSP_BINDING_COUNT 15
+#define LSP_BINDING_NONE 15 /* of MATL's buffer, which the trace shader does not read */
 
-/* Addresses in the table: those of the sections of bindings LSP_BINDING_NODES to LSP_BINDING_REFERENCES. */
-#define LSP_VULKAN_ADDRESS_COUNT 8
+/* Addresses in the table: those of the sections of bindings LSP_BINDING_NODES to LSP_BINDING_CELL_NODES. */
+#define LSP_VULKAN_ADDRESS_COUNT 11
 
 /* Rays of a work group, one an invocation. */
 #define LSP_VULKAN_GROUP_SIZE 64
@@ -85,6 +97,7 @@ LSP_BEGIN(lsp_vulkan_trace_constants)
   LSP_FLOAT lod; /* as in lsp_trace_options */
   LSP_UINT first;
   LSP_UINT count;
+  LSP_UINT dial; /* lsp_dial */
 LSP_END(lsp_vulkan_trace_constants)
 
 /* Fields of lsp_trace_counts, which the counting shader adds to; the first, the rays, the host knows. */
@@ -93,12 +106,15 @@ LSP_END(lsp_vulkan_trace_constants)
 #define LSP_COUNTER_NODES 3u
 #define LSP_COUNTER_SHAFTS 4u
 #define LSP_COUNTER_TRIANGLES 5u
+#define LSP_COUNTER_SPLITS 6u
+#define LSP_COUNTER_EXACT 7u
+#define LSP_COUNTER_EXACT_NODES 8u
 
 #if defined(__cplusplus)
-static_assert(sizeof(LspRay) == 32 && sizeof(LspHit) == 32 && sizeof(lsp_vulkan_trace_constants) == 12);
+static_assert(sizeof(LspRay) == 32 && sizeof(LspHit) == 32 && sizeof(lsp_vulkan_trace_constants) == 16);
 #elif !defined(GL_core_profile)
 _Static_assert(sizeof(LspRay) == 32 && sizeof(LspHit) == 32, "as in ray and hit files and in shaders");
-_Static_assert(sizeof(lsp_vulkan_trace_constants) == 12, "as in shaders");
+_Static_assert(sizeof(lsp_vulkan_trace_constants) == 16, "as in shaders");
 #endif
 
 #endif /* LSP_INTERFACE_H */

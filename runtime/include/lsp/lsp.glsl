@@ -5,15 +5,20 @@
  *   #define LSP_SET 0                // descriptor set of the scene's buffers, default 0
  *   #define LSP_FIRST_BINDING 0      // binding of the header; the others follow it, default 0
  *   #define LSP_NTREE                // the scene's base structure is an NTree, not a BVH
+ *   #define LSP_CELLS                // or it has cells, and the rays are approximate
  *   #define LSP_ADDRESSES            // sections are read through addresses, see lsp_addresses.glsl
  *   #include "lsp/lsp.glsl"
  *
  *   LspHit hit = lsp_trace(lsp_bound_scene(), ray, LSP_TRACE_APPROXIMATE, 0.0);
  *
+ * Cells take the dial, what lsp_dial of lsp/lsp.h answers, as one argument more.
+ *
  * Bindings (LSP_BINDING_* of lsp/interface.h), each a read-only storage buffer, all from the file as it lies on disk:
  *   +0 header   +1 NODE   +2 TRIA   +3 NRML   +4 LSPC   +5 BITS   +6 CAND
- * and of an NTree
+ * of an NTree also
  *   +1 GRID   +7 CELL   +8 REFS
+ * and of cells, which have no Line Spaces,
+ *   +4 CSPL   +5 CPLN   +6 CENT   +7 CGRD   +8 CREF   +9 CELT   +10 CPRC   +11 CNOD
  * A section the file does not have is bound to any buffer (the header's, say): it is not read.
  *
  * The stack lives in LSP_STACK_SIZE entries of 8 bytes: define it as header.max_stack, or leave it to the
@@ -67,6 +72,16 @@ LspLineSpace lsp_line_space_of(uvec4 a, uvec4 b, uvec4 c, uvec4 d) {
                       d.y, d.z, d.w);
 }
 
+uint lsp_entry_of(uint word, uint i) { return (word >> ((i & 1u) * 16u)) & 0xFFFFu; }
+LspPlane lsp_plane_of(uvec4 w) { return LspPlane(uintBitsToFloat(w.xyz), uintBitsToFloat(w.w)); }
+LspSplit lsp_split_of(uvec2 w) { return LspSplit(w.x, w.y); }
+LspCellNode lsp_cell_node_of(uvec4 w) { return LspCellNode(w.x, w.y, w.z, w.w); }
+
+/* Of a filled cell what is read together; the rest is zero. */
+LspFilledCell lsp_cell_origins_of(uvec4 w) { return LspFilledCell(w.x, w.y, w.z, w.w, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u); }
+LspFilledCell lsp_cell_answers_of(uvec4 w) { return LspFilledCell(0u, 0u, 0u, 0u, w.x, w.y, w.z, w.w, 0u, 0u, 0u, 0u); }
+LspFilledCell lsp_cell_tree_of(uvec4 w) { return LspFilledCell(0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, w.x, w.y, w.z, w.w); }
+
 #ifdef LSP_ADDRESSES
 #include "lsp/lsp_addresses.glsl"
 #else
@@ -86,8 +101,13 @@ vec3 lsp_float3_of(vec3 v) { return v; }
 #include "lsp/traverse.h"
 
 /* flags: LSP_TRACE_*; lod: stop at a Line Space once its diagonal is under lod * distance, 0: deepest. */
+LspHit lsp_trace(LspScene scene, LspRay ray, uint flags, float lod, uint dial) {
+  return lsp_trace_ray(scene, ray, flags, lod, dial).hit;
+}
+
+/* With cells: balanced. */
 LspHit lsp_trace(LspScene scene, LspRay ray, uint flags, float lod) {
-  return lsp_trace_ray(scene, ray, flags, lod).hit;
+  return lsp_trace(scene, ray, flags, lod, lsp_load_header(scene).quality[LSP_QUALITY_BALANCED]);
 }
 
 #endif

@@ -59,8 +59,9 @@ typedef struct lsp_scene {
   uint64_t size;
   const LspHeader* header;
   const LspSection* sections; /* header->section_count of them */
-  /* One pointer a section (lsp/sections.def): nodes or, of an NTree, grid, cells, references; triangles, normals,
-   * materials; line_spaces, bit_words, candidates. */
+  /* One pointer a section (lsp/sections.def): nodes or, of an NTree, grid, cells, references; of cells besides nodes cell_words,
+   * filled_cells, entries, planes, plane_records, splits, cell_nodes, cell_references; triangles, normals, materials;
+   * line_spaces, bit_words, candidates. */
 #define LSP_ARRAY_SECTION(Name, TYPE, code, Element, flag, base, feature, owed, member, ...) const Element* member;
 #include "lsp/sections.def"
 } lsp_scene;
@@ -69,6 +70,10 @@ typedef struct lsp_scene {
  * Touches the header, the section table and nothing else: the cost does not depend on the file's size, and
  * hashes are not computed (lsp-validate does). A packed file is LSP_ERROR_UNSUPPORTED: unpack it first. */
 lsp_status lsp_open(const void* bytes, uint64_t size, lsp_scene* scene, lsp_error* error);
+
+/* What positions in the scene, in rays and in hits are relative to, x y z in the input's space: not zero where single
+ * precision would have moved vertices. */
+void lsp_scene_origin(const lsp_scene* scene, double origin[3]);
 
 /* Raw and packed form. header.alignment states the alignment of the raw form, in packed files too. A file with
  * any compressed section is packed: its sections start at multiples of 256 and its length is padded to 256. In
@@ -88,19 +93,36 @@ lsp_status lsp_unpack(const void* bytes, uint64_t size, void* out, uint64_t out_
 
 /* ---- tracing on the CPU --------------------------------------------------------------------------------- */
 
+#ifdef __cplusplus
+#define LSP_DEFAULT(value) = value
+#else
+#define LSP_DEFAULT(value)
+#endif
+
+/* All zero: exact, closest hits. */
 typedef struct lsp_trace_options {
   uint32_t flags; /* LSP_TRACE_* */
   float lod; /* theta: stop at a Line Space once its box's diagonal is under lod * distance; 0: deepest only */
+  uint32_t quality LSP_DEFAULT(0); /* of cells: LSP_QUALITY_*, 0: balanced */
+  float max_loss LSP_DEFAULT(0);   /* with LSP_TRACE_MAX_LOSS: where entries of cells lose more, in per cent, the cell is
+                       traced exactly. 100: tables alone, 0: no entry is heeded */
 } lsp_trace_options;
+#undef LSP_DEFAULT
+
+/* The dial that the options ask for: the quality's, which the file states, or max_loss's. LSP_DIAL. */
+uint32_t lsp_dial(const lsp_scene* scene, const lsp_trace_options* options);
 
 /* Sums over the rays traced. */
 typedef struct lsp_trace_counts {
   uint64_t rays;
   uint64_t invalid; /* rays with a non-finite component, a zero direction or tmin > tmax: misses */
   uint64_t hits;
-  uint64_t nodes;     /* LspNode visited (two boxes each); NTree: cells stepped through, empty ones too */
+  uint64_t nodes;     /* LspNode visited (two boxes each); NTree and cells: cells stepped through, empty ones too */
   uint64_t shafts;    /* Line Space look-ups */
   uint64_t triangles; /* triangles tested exactly */
+  uint64_t splits;      /* cells: look-ups that found a split */
+  uint64_t exact;       /* cells: exact traces of one cell */
+  uint64_t exact_nodes; /* cells: LspCellNode visited in these */
 } lsp_trace_counts;
 
 /* Traces rays[0, count) into hits[0, count), in this thread, with some 20 KiB of its stack. Adds to *counts unless it

@@ -5,8 +5,8 @@
  *   #extension GL_EXT_buffer_reference : require
  *   #extension GL_EXT_buffer_reference_uvec2 : require
  *
- * Binding +0 is the header as without; +1 is a storage buffer of eight 64-bit addresses, those of the sections
- * of bindings +1 to +8 there (lsp_vulkan_address_table writes it). Nothing else differs.
+ * Binding +0 is the header as without; +1 is a storage buffer of eleven 64-bit addresses, those of the sections
+ * of bindings +1 to +11 there (lsp_vulkan_address_table writes it). Nothing else differs.
  *
  * No robustBufferAccess watches over addresses, so every index is checked against the header's counts here,
  * which lsp_open has checked against the file: a bad index reads zeros, as on the CPU.
@@ -28,6 +28,9 @@ struct LspScene {
   uvec2 candidates;
   uvec2 cells;
   uvec2 references;
+  uvec2 filled_cells; /* of cells, as the next; there splits, planes, entries and cell words come before */
+  uvec2 plane_records;
+  uvec2 cell_nodes;
 };
 
 layout(std430, set = LSP_SET, binding = LSP_FIRST_BINDING + LSP_BINDING_NODES) readonly buffer LspAddressBuffer {
@@ -37,6 +40,48 @@ layout(std430, set = LSP_SET, binding = LSP_FIRST_BINDING + LSP_BINDING_NODES) r
 /* The scene whose table is bound. */
 LspScene lsp_bound_scene() { return lsp_addresses; }
 
+LspTriangle lsp_load_triangle(LspScene scene, uint i) {
+  if (i >= lsp_header.triangle_count) return lsp_triangle_of(uvec4(0u), uvec4(0u), uvec4(0u));
+  LspWords4 words = LspWords4(scene.triangles);
+  return lsp_triangle_of(words.at[3u * i], words.at[3u * i + 1u], words.at[3u * i + 2u]);
+}
+
+LspCornerNormals lsp_load_normals(LspScene scene, uint i) {
+  if (i >= lsp_header.triangle_count) return LspCornerNormals(0u, 0u, 0u);
+  LspWords words = LspWords(scene.normals);
+  return LspCornerNormals(words.at[3u * i], words.at[3u * i + 1u], words.at[3u * i + 2u]);
+}
+
+#ifdef LSP_CELLS
+uint lsp_load_cell_word(LspScene scene, uint i) {
+  LspCellGrid grid = lsp_header.cells;
+  return i < grid.cells_x * grid.cells_y * grid.cells_z ? LspWords(scene.cells).at[i] : 0u;
+}
+uint lsp_load_entry(LspScene scene, uint i) {
+  return (i >> 1u) < lsp_header.entry_word_count ? lsp_entry_of(LspWords(scene.candidates).at[i >> 1u], i) : 0u;
+}
+uvec4 lsp_load_filled_cell(LspScene scene, uint i, uint part) {
+  return i < lsp_header.filled_cell_count ? LspWords4(scene.filled_cells).at[3u * i + part] : uvec4(0u);
+}
+LspFilledCell lsp_load_cell_origins(LspScene scene, uint i) { return lsp_cell_origins_of(lsp_load_filled_cell(scene, i, 0u)); }
+LspFilledCell lsp_load_cell_answers(LspScene scene, uint i) { return lsp_cell_answers_of(lsp_load_filled_cell(scene, i, 1u)); }
+LspFilledCell lsp_load_cell_tree(LspScene scene, uint i) { return lsp_cell_tree_of(lsp_load_filled_cell(scene, i, 2u)); }
+LspPlane lsp_load_plane(LspScene scene, uint i) {
+  return lsp_plane_of(i < lsp_header.plane_count ? LspWords4(scene.bit_words).at[i] : uvec4(0u));
+}
+uint lsp_load_plane_record(LspScene scene, uint i) {
+  return i < lsp_header.plane_count ? LspWords(scene.plane_records).at[i] : 0u;
+}
+LspSplit lsp_load_split(LspScene scene, uint i) {
+  return lsp_split_of(i < lsp_header.split_count ? LspWords2(scene.line_spaces).at[i] : uvec2(0u));
+}
+LspCellNode lsp_load_cell_node(LspScene scene, uint i) {
+  return lsp_cell_node_of(i < lsp_header.cell_node_count ? LspWords4(scene.cell_nodes).at[i] : uvec4(0u));
+}
+uint lsp_load_cell_reference(LspScene scene, uint i) {
+  return i < lsp_header.cell_reference_count ? LspWords(scene.references).at[i] : 0u;
+}
+#else
 #ifdef LSP_NTREE
 LspBitWord lsp_load_grid(LspScene scene, uint i) {
   uint count = lsp_header.node_count * LSP_GRID_WORDS(lsp_header.ntree_branching);
@@ -62,18 +107,6 @@ LspNode lsp_load_node(LspScene scene, uint i) {
 }
 #endif
 
-LspTriangle lsp_load_triangle(LspScene scene, uint i) {
-  if (i >= lsp_header.triangle_count) return lsp_triangle_of(uvec4(0u), uvec4(0u), uvec4(0u));
-  LspWords4 words = LspWords4(scene.triangles);
-  return lsp_triangle_of(words.at[3u * i], words.at[3u * i + 1u], words.at[3u * i + 2u]);
-}
-
-LspCornerNormals lsp_load_normals(LspScene scene, uint i) {
-  if (i >= lsp_header.triangle_count) return LspCornerNormals(0u, 0u, 0u);
-  LspWords words = LspWords(scene.normals);
-  return LspCornerNormals(words.at[3u * i], words.at[3u * i + 1u], words.at[3u * i + 2u]);
-}
-
 LspLineSpace lsp_load_line_space(LspScene scene, uint i) {
   if (i >= lsp_header.line_space_count) return lsp_line_space_of(uvec4(0u), uvec4(0u), uvec4(0u), uvec4(0u));
   LspWords4 words = LspWords4(scene.line_spaces);
@@ -89,5 +122,7 @@ LspBitWord lsp_load_bit_word(LspScene scene, uint i) {
 uint lsp_load_candidate(LspScene scene, uint i) {
   return i < lsp_header.candidate_word_count ? LspWords(scene.candidates).at[i] : 0u;
 }
+
+#endif
 
 #endif

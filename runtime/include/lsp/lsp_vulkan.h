@@ -147,7 +147,8 @@ void lsp_vulkan_record_upload_barrier(const lsp_vulkan_functions* functions, VkC
  * compiled away; with a part missing that a scene needs its answers are wrong. */
 uint32_t lsp_vulkan_parts(const lsp_scene* scene);
 
-/* SPIR-V (for Vulkan 1.1) of the trace shader for scenes planned like `plan`, entry point "main"; with `counting`
+/* SPIR-V (for Vulkan 1.1) of the trace shader for scenes planned like `plan` (of cells: for approximate rays; for exact
+ * ones set base_structure of a copy to LSP_BASE_BVH), entry point "main"; with `counting`
  * nonzero the one that adds to the counters. Only base_structure and addresses of the plan matter; with addresses
  * the device's bufferDeviceAddress feature must be on, else no feature is needed. Sets *bytes to the size. The words
  * live as long as the program. */

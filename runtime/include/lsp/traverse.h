@@ -64,6 +64,9 @@ struct LspCounts {
   uint nodes;
   uint shafts;
   uint triangles;
+  uint splits; /* of cells, as the next */
+  uint exact;  /* traces of a cell's triangles */
+  uint exact_nodes;
 };
 
 /* What is asked of the scene. */
@@ -71,6 +74,7 @@ struct LspQuery {
   uint flags; /* LSP_TRACE_* */
   float lod;
   bool far; /* the ray comes from so far away that the base structure treats it apart: lsp_is_far */
+  uint dial; /* LSP_DIAL: entries of cells that lose more are not heeded */
 };
 
 /* A ray made ready: t is in lengths of `direction`, which is the given one times 2^-exponent. */
@@ -119,6 +123,9 @@ LSP_FN LspCounts lsp_no_counts() {
   counts.nodes = 0u;
   counts.shafts = 0u;
   counts.triangles = 0u;
+  counts.splits = 0u;
+  counts.exact = 0u;
+  counts.exact_nodes = 0u;
   return counts;
 }
 
@@ -323,6 +330,29 @@ LSP_FN bool lsp_leaves_cone(LspScene scene, uint index, float u, float v) {
   return d < limit;
 }
 
+/* Weights of corners 1 and 2 at the point of the ray at t, taken to lie in the triangle's plane. */
+LSP_FN vec2 lsp_plane_weights(LspSetup s, LspTriangle tri, float t) {
+  vec3 v0 = lsp_vec3(tri.v0);
+  vec3 e1 = lsp_vec3(tri.v1) - v0;
+  vec3 e2 = lsp_vec3(tri.v2) - v0;
+  vec3 n = lsp_cross(e1, e2);
+  vec3 w = v0 - s.origin;
+  precise vec3 r = s.direction * t - w;
+  precise float scale = 1.0f / lsp_dot(n, n);
+  precise vec2 weights = vec2(lsp_dot(lsp_cross(r, e2), n) * scale, lsp_dot(lsp_cross(e1, r), n) * scale);
+  return weights;
+}
+
+/* Whether rounding moves a ray by no more than conservative Line Spaces allow for (lsp/empty_margin.h). */
+LSP_FN bool lsp_may_skip_empty(LspScene scene, LspSetup s) {
+  vec3 lo = lsp_vec3(lsp_load_header(scene).bounds_min);
+  vec3 hi = lsp_vec3(lsp_load_header(scene).bounds_max);
+  precise float limit =
+      LSP_EMPTY_EXTENT * lsp_largest(hi - lo) + LSP_EMPTY_REACH * lsp_max(lsp_largest(lo), lsp_largest(hi));
+  return s.err <= limit;
+}
+
+#ifndef LSP_CELLS
 /* Where the ray passes the box of a Line Space, and which shaft it takes. The shaft is in range for any ray;
  * a ray that misses the box has t_in > t_out. Entry and exit face are never the same one: on one axis they
  * are its two sides. */
@@ -412,19 +442,6 @@ LSP_FN uint lsp_candidate(LspScene scene, LspLineSpace ls, uint entry) {
   return local == LSP_NONE ? LSP_NONE : ls.triangle_first + local;
 }
 
-/* Weights of corners 1 and 2 at the point of the ray at t, taken to lie in the triangle's plane. */
-LSP_FN vec2 lsp_plane_weights(LspSetup s, LspTriangle tri, float t) {
-  vec3 v0 = lsp_vec3(tri.v0);
-  vec3 e1 = lsp_vec3(tri.v1) - v0;
-  vec3 e2 = lsp_vec3(tri.v2) - v0;
-  vec3 n = lsp_cross(e1, e2);
-  vec3 w = v0 - s.origin;
-  precise vec3 r = s.direction * t - w;
-  precise float scale = 1.0f / lsp_dot(n, n);
-  precise vec2 weights = vec2(lsp_dot(lsp_cross(r, e2), n) * scale, lsp_dot(lsp_cross(e1, r), n) * scale);
-  return weights;
-}
-
 /* Whether a ray that passes the box of a Line Space may find something there that is nearer than best. */
 LSP_FN bool lsp_may_hit(LspPassage pass, LspBest best) {
   return pass.t_in <= pass.t_out && pass.t_in < best.t;
@@ -494,15 +511,6 @@ LSP_FN bool lsp_is_node(uint ref) { return (ref & (LSP_LEAF_BIT | LSP_STACK_LINE
 LSP_FN bool lsp_is_near(uint ref) { return (ref >> 29u) == 3u; }
 
 LSP_FN uint lsp_line_space_index(uint ref) { return ref & LSP_STACK_INDEX_MASK; }
-
-/* Whether rounding moves a ray by no more than conservative Line Spaces allow for (lsp/empty_margin.h). */
-LSP_FN bool lsp_may_skip_empty(LspScene scene, LspSetup s) {
-  vec3 lo = lsp_vec3(lsp_load_header(scene).bounds_min);
-  vec3 hi = lsp_vec3(lsp_load_header(scene).bounds_max);
-  precise float limit =
-      LSP_EMPTY_EXTENT * lsp_largest(hi - lo) + LSP_EMPTY_REACH * lsp_max(lsp_largest(lo), lsp_largest(hi));
-  return s.err <= limit;
-}
 
 /* Whether a Line Space proves that the ray, wherever it begins and ends, hits nothing in its node. */
 LSP_FN bool lsp_is_empty(LspScene scene, LspSetup s, uint index) {
@@ -589,6 +597,10 @@ LSP_STEP void lsp_look_up(LspScene scene, LspSetup s, LspQuery q) {
   lsp_answer(scene, s, q, ls, pass, candidate);
 }
 
+#else
+#include "lsp/cells.h"
+#endif
+
 LSP_FN LspHit lsp_no_hit() {
   LspHit hit;
   hit.t = LSP_INFINITY;
@@ -671,13 +683,14 @@ LSP_STEP LspTraced lsp_trace_ready(LspScene scene, LspSetup s, LspQuery q, LspRa
   return traced;
 }
 
-/* Traces one ray. flags: LSP_TRACE_*; lod: see lsp_trace_options. */
-LSP_STEP LspTraced lsp_trace_ray(LspScene scene, LspRay ray, uint flags, float lod) {
+/* Traces one ray. flags: LSP_TRACE_*; lod: see lsp_trace_options; dial: LSP_DIAL, of cells. */
+LSP_STEP LspTraced lsp_trace_ray(LspScene scene, LspRay ray, uint flags, float lod, uint dial) {
   LspSetup s = lsp_setup(scene, ray);
   if (!s.valid) return lsp_invalid_ray();
   LspQuery q;
   q.flags = flags;
   q.lod = lod;
+  q.dial = dial;
   q.far = lsp_is_far(scene, s);
   return lsp_trace_ready(scene, s, q, ray);
 }

@@ -29,11 +29,11 @@ async function compile(path) {
   return module_.exports.Lsp || module_.exports;
 }
 
-const wide = new Set(['file_bytes', 'section_table_offset', 'primitive_count', 'offset', 'stored_bytes', 'bytes', 'element_count']);
-const floats = new Set(['normal_angle_cos', 'plane_tolerance', 'ntree_size', 'ntree_margin', 'opacity', 'roughness', 'metallic', 'x', 'y', 'z']);
+const wide = new Set(['origin_x', 'origin_y', 'origin_z', 'file_bytes', 'section_table_offset', 'primitive_count', 'offset', 'stored_bytes', 'bytes', 'element_count']);
+const floats = new Set(['cells_size', 'cells_per_size', 'cells_margin', 'cells_box_step', 'distance', 'normal_angle_cos', 'plane_tolerance', 'ntree_size', 'ntree_margin', 'opacity', 'roughness', 'metallic', 'x', 'y', 'z']);
 
-// headerBytes becomes header_bytes; the compiler drops the underscore of reserved_0.
-const snake = (name) => (name === 'reserved0' ? 'reserved_0' : name.replace(/([A-Z])/g, '_$1').toLowerCase());
+// headerBytes becomes header_bytes; the compiler drops the underscore before a digit.
+const snake = (name) => name.replace(/([A-Z])/g, '_$1').replace(/^(reserved|box)(\d)$/, '$1_$2').toLowerCase();
 const bits = (value) => new Uint32Array(new Float32Array([value]).buffer)[0];
 const hex = (bytes) => Buffer.from(bytes).toString('hex');
 

@@ -1,5 +1,6 @@
 // Prints every value of an .lsp file as JSON, for comparison with a second, independent reader. Floats are
 // printed as their bits, 64-bit numbers as strings, hashes as their 16 bytes in hexadecimal.
+#include <algorithm>
 #include <cstdio>
 #include <cstring>
 #include <nlohmann/json.hpp>
@@ -49,15 +50,16 @@ Json struct_of(const Struct& owner, const std::byte* bytes) {
   Json json = Json::object();
   for (size_t i = 0; i < owner.fields.size(); ++i) {
     const Field& field = owner.fields[i];
-    const std::string_view name = field.name;
+    std::string name = field.name;
+    std::replace(name.begin(), name.end(), '.', '_');  // of a struct within
     if (name == "magic_0") {
       json["magic"] = hex(bytes + field.offset, 8);
       ++i;
     } else if (name.ends_with("hash_lo")) {
-      json[std::string(name.substr(0, name.size() - 3))] = hex(bytes + field.offset, 16);
+      json[name.substr(0, name.size() - 3)] = hex(bytes + field.offset, 16);
       ++i;
     } else {
-      json[std::string(name)] = value_of(field, bytes);
+      json[name] = value_of(field, bytes);
     }
   }
   return json;

@@ -34,7 +34,8 @@ void trace_rays(const lsp_scene& scene, uint64_t seed, size_t count, bool valida
   for (uint32_t flags = 0; flags <= LSP_TRACE_ALL_FLAGS; ++flags) {
     const bool able =
         header.required_features &
-        (flags & LSP_TRACE_APPROXIMATE ? LSP_FEATURE_LINE_SPACES | LSP_FEATURE_EXACT : LSP_FEATURE_EXACT);
+        (flags & LSP_TRACE_APPROXIMATE ? LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS | LSP_FEATURE_EXACT
+                                       : LSP_FEATURE_EXACT);
     const lsp_trace_options options{flags, random.unit()};
     lsp_trace_counts counts{};
     const lsp_status status = lsp_trace(&scene, &options, rays.data(), hits.data(), count, nullptr, nullptr);

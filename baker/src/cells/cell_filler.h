@@ -1,0 +1,36 @@
+// Fills the tables of one cell.
+#pragma once
+
+#include <optional>
+#include <unordered_map>
+
+#include "answer_fit.h"
+#include "cell_tables.h"
+#include "cell_tree.h"
+#include "lsp/lsp.h"
+#include "shaft_raster.h"
+
+namespace lsp {
+
+// What all cells share.
+struct CellScene {
+  const CellGrid& grid;
+  const lsp_scene& whole;  // triangles' primitives are records
+  std::span<const LspTriangle> triangles;
+  const CellTableOptions& options;
+  float offset;  // of ray origins from the surface, world space
+};
+
+// One cell's tables before they find their place in the file.
+struct FilledCell {
+  uint64_t sub_mask = 0;
+  std::vector<uint16_t> far, origin;  // entries
+  std::vector<Plane> planes;
+  std::vector<uint32_t> plane_records;
+  std::vector<LspSplit> splits;
+  CellTree tree;  // its references are LspTriangle
+  bool overflow = false;
+};
+FilledCell fill_cell(const CellScene& scene, uint32_t cell);
+
+}  // namespace lsp

@@ -1,0 +1,152 @@
+#include "cell_grid.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "conservative.h"
+
+namespace lsp {
+namespace {
+
+constexpr float kPad = 1e-3f;     // of the longest side: no surface lies on the grid's own border
+constexpr float kMargin = 1e-4f;  // of a cell's edge
+constexpr size_t kWantedCells = 1200;
+constexpr size_t kTrianglesPerCell = 8;
+constexpr uint32_t kMostLongest = 96;
+constexpr size_t kPart = 4096;  // triangles that one task sorts into cells
+
+glm::vec3 vec(const lsp_float3& v) { return {v.x, v.y, v.z}; }
+
+struct Reference {
+  uint32_t cell, record;
+};
+
+// The cells that a triangle reaches into.
+void add_references(const CellGrid& grid, const LspTriangle& triangle, uint32_t record,
+                    std::vector<Reference>& out) {
+  Box box;
+  for (const lsp_float3& v : {triangle.v0, triangle.v1, triangle.v2}) box.grow(vec(v));
+  const auto cell_of = [&](const glm::vec3& p) {
+    return glm::clamp(glm::ivec3(glm::floor((p - grid.lo) / grid.size)), glm::ivec3(0), grid.dims - 1);
+  };
+  const glm::ivec3 first = cell_of(box.lo - 2 * grid.margin), last = cell_of(box.hi + 2 * grid.margin);
+  glm::ivec3 c;
+  for (c.z = first.z; c.z <= last.z; ++c.z)
+    for (c.y = first.y; c.y <= last.y; ++c.y)
+      for (c.x = first.x; c.x <= last.x; ++c.x) {
+        const glm::dvec3 lo = glm::dvec3(grid.corner(c)) - double(grid.margin);
+        const glm::dvec3 hi = glm::dvec3(grid.corner(c + 1)) + double(grid.margin);
+        if (first == last || reaches_into(triangle, lo, hi)) out.push_back({uint32_t(grid.index(c)), record});
+      }
+}
+
+// How far every empty cell is from the nearest filled one, in cells along the longest axis: a box blur of the
+// filled ones, a cell further with every pass.
+void add_jumps(CellGrid& grid) {
+  const glm::ivec3 n = grid.dims;
+  std::vector<uint8_t> reached(grid.words.size()), next;
+  for (size_t i = 0; i < reached.size(); ++i) reached[i] = (grid.words[i] & LSP_CELL_FILLED) != 0;
+  const size_t strides[] = {1, size_t(n.x), size_t(n.x) * size_t(n.y)};
+  const auto spread = [&](int axis) {
+    next = reached;
+    const size_t stride = strides[axis], length = size_t(n[axis]);
+    for (size_t i = 0; i < reached.size(); ++i) {
+      const size_t at = i / stride % length;
+      if (at > 0) next[i] |= reached[i - stride];
+      if (at + 1 < length) next[i] |= reached[i + stride];
+    }
+    std::swap(reached, next);
+  };
+  std::vector<uint8_t> before;
+  for (uint32_t jump = 0; jump < LSP_CELL_MAX_JUMP; ++jump) {
+    before = reached;
+    for (int axis = 0; axis < 3; ++axis) spread(axis);
+    bool any = false;
+    for (size_t i = 0; i < reached.size(); ++i)
+      if (reached[i] != 0 && before[i] == 0) {
+        grid.words[i] = jump;
+        any = true;
+      }
+    if (!any) break;
+  }
+}
+
+}  // namespace
+
+CellGrid build_cell_grid(std::span<const LspTriangle> triangles, const Box& bounds, uint32_t longest) {
+  CellGrid grid;
+  const glm::vec3 extent = bounds.extent();
+  const float side = std::max({extent.x, extent.y, extent.z});
+  const glm::vec3 reach = glm::max(glm::abs(bounds.lo), glm::abs(bounds.hi));
+  const float rounding = std::max({reach.x, reach.y, reach.z, side}) * 3.8146973e-6f;  // 64 u
+  const float pad = side * kPad + 2 * rounding;
+  grid.lo = bounds.lo - pad;
+  grid.size = (side + 2 * pad) / float(longest);
+  for (int k = 0; k < 3; ++k)
+    grid.dims[k] = std::clamp(int(std::ceil((extent[k] + 2 * pad) / grid.size - 1e-4f)), 1, int(longest));
+  grid.margin = grid.size * kMargin + rounding;
+  grid.words.assign(size_t(grid.dims.x) * size_t(grid.dims.y) * size_t(grid.dims.z), LSP_CELL_MAX_JUMP);
+
+  std::vector<std::vector<Reference>> parts((triangles.size() + kPart - 1) / kPart);
+  tbb::parallel_for(size_t(0), parts.size(), [&](size_t p) {
+    for (size_t i = p * kPart; i < std::min(triangles.size(), (p + 1) * kPart); ++i)
+      add_references(grid, triangles[i], uint32_t(i), parts[p]);
+  });
+  // Sorted by cell, in each cell by record; a primitive that spatial splits repeat counts once.
+  std::vector<uint32_t> counts(grid.words.size());
+  size_t total = 0;
+  for (const auto& part : parts) {
+    for (const Reference& r : part) ++counts[r.cell];
+    total += part.size();
+  }
+  std::vector<uint32_t> begin(counts.size());
+  uint32_t at = 0;
+  for (size_t i = 0; i < counts.size(); ++i) {
+    begin[i] = at;
+    at += counts[i];
+  }
+  std::vector<uint32_t> sorted(total), cursor = begin;
+  for (const auto& part : parts)
+    for (const Reference& r : part) sorted[cursor[r.cell]++] = r.record;
+  std::vector<uint32_t> cell_records;
+  for (size_t i = 0; i < counts.size(); ++i) {
+    if (counts[i] == 0) continue;
+    cell_records.assign(sorted.begin() + begin[i], sorted.begin() + begin[i] + counts[i]);
+    std::stable_sort(cell_records.begin(), cell_records.end(),
+                     [&](uint32_t a, uint32_t b) { return triangles[a].primitive < triangles[b].primitive; });
+    const auto same = [&](uint32_t a, uint32_t b) {
+      return triangles[a].primitive == triangles[b].primitive;
+    };
+    cell_records.erase(std::unique(cell_records.begin(), cell_records.end(), same), cell_records.end());
+    std::sort(cell_records.begin(), cell_records.end());
+    const auto coordinate = int(i);
+    grid.words[i] = LSP_CELL_FILLED | uint32_t(grid.cells.size());
+    grid.cells.push_back({{coordinate % grid.dims.x, coordinate / grid.dims.x % grid.dims.y,
+                           coordinate / grid.dims.x / grid.dims.y},
+                          uint32_t(grid.records.size()),
+                          uint32_t(cell_records.size())});
+    grid.records.insert(grid.records.end(), cell_records.begin(), cell_records.end());
+  }
+  add_jumps(grid);
+  return grid;
+}
+
+CellGrid choose_cell_grid(std::span<const LspTriangle> triangles, const Box& bounds) {
+  // Filled cells grow with the square of the cells on the longest side, or a little faster.
+  const size_t wanted = std::clamp(triangles.size() / kTrianglesPerCell, size_t(8), kWantedCells);
+  uint32_t longest = 8;
+  CellGrid grid = build_cell_grid(triangles, bounds, longest);
+  for (int attempt = 0; attempt < 4; ++attempt) {
+    const double more = double(wanted) / double(std::max<size_t>(1, grid.cells.size()));
+    if (more > 0.8 && more < 1.25) break;
+    const auto next = uint32_t(std::clamp(std::lround(longest * std::sqrt(more)), 2l, long(kMostLongest)));
+    if (next == longest) break;
+    longest = next;
+    grid = build_cell_grid(triangles, bounds, longest);
+  }
+  return grid;
+}
+
+}  // namespace lsp

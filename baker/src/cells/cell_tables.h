@@ -1,0 +1,51 @@
+// The tables of filled cells: a far table (Line Space) for rays that pass through, an origin table for each
+// part of the cell that holds surface, for rays that begin there.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "bvh.h"
+#include "cell_grid.h"
+#include "lsp/layout.h"
+
+namespace lsp {
+
+struct CellTableOptions {
+  uint32_t far_patches = 3;      // N: patches along an edge of a cell, of far tables
+  uint32_t origin_patches = 4;   // M: of origin tables
+  uint32_t sub_cells = 2;        // along an edge of a cell, 1 to 4
+  uint32_t far_samples = 64;     // rays of a mixed shaft
+  uint32_t origin_samples = 32;  // rays of an entry of an origin table, on average
+  bool splits = true;
+};
+
+struct CellTables {
+  std::vector<LspFilledCell> cells;
+  std::vector<uint32_t> entries;  // two in a word
+  std::vector<LspPlane> planes;
+  std::vector<uint32_t> plane_records;  // by plane: its LspTriangle
+  std::vector<LspSplit> splits;
+  std::vector<LspCellNode> nodes;
+  std::vector<uint32_t> references;  // of leaves: LspTriangle
+  uint32_t origin_entry_first = 0;
+  // For the report.
+  uint64_t far_entries = 0, origin_entries = 0, overflowed = 0;
+};
+
+// Fills the tables of all cells of the grid on all threads of the current oneTBB arena; the result does not
+// depend on their number.
+CellTables fill_cell_tables(const CellGrid& grid, const Bvh& bvh, const LspHeader& header,
+                            std::span<const LspTriangle> triangles, const CellTableOptions& options,
+                            const std::function<void(double)>& progress = {});
+
+// Writes what the header states of grid and tables, but for the dial.
+void set_cells(const CellGrid& grid, const CellTables& tables, const CellTableOptions& options,
+               LspHeader& header);
+
+// The class of loss that an entry states for a share of wrong answers, see LSP_LOSS_*.
+uint32_t loss_class(float loss);
+
+}  // namespace lsp

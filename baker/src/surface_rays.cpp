@@ -1,0 +1,117 @@
+#include "surface_rays.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "lsp/lsp.h"
+
+namespace lsp {
+namespace {
+
+constexpr double kOffset = 1e-4;  // of the diagonal
+
+// PCG-RXS-M-XS 32 (O'Neill 2014) as a hash of a counter: any ray can be made without the ones before it.
+double random(uint64_t ray, uint32_t dimension) {
+  uint32_t x = uint32_t(ray) * 747796405u + uint32_t(ray >> 32) * 277803737u + dimension * 2891336453u + 1u;
+  for (int i = 0; i < 2; ++i) {
+    x = x * 747796405u + 2891336453u;
+    x = ((x >> ((x >> 28) + 4)) ^ x) * 277803737u;
+    x = (x >> 22) ^ x;
+  }
+  return (x + 0.5) / 4294967296.0;
+}
+
+glm::dvec3 vec(const lsp_float3& v) { return {v.x, v.y, v.z}; }
+lsp_float3 f3(const glm::dvec3& v) { return {float(v.x), float(v.y), float(v.z)}; }
+
+double diagonal(const LspHeader& h) { return glm::length(vec(h.bounds_max) - vec(h.bounds_min)); }
+
+// Uniform on the unit sphere with square roots only, so that every machine makes the same (Marsaglia 1972).
+glm::dvec3 on_sphere(uint64_t ray, uint32_t dimension) {
+  double x = 0, y = 0, square = 2;
+  for (uint32_t attempt = 0; square >= 1 || square == 0; ++attempt) {
+    x = 2 * random(ray, dimension + 2 * attempt) - 1;
+    y = 2 * random(ray, dimension + 1 + 2 * attempt) - 1;
+    square = x * x + y * y;
+  }
+  const double f = 2 * std::sqrt(1 - square);
+  return {x * f, y * f, 1 - 2 * square};
+}
+
+// Cosine-distributed about `n`: a point on the sphere about the normal's tip.
+glm::dvec3 cosine_direction(const glm::dvec3& n, uint64_t ray) {
+  return glm::normalize(n * (1 + 1e-9) + on_sphere(ray, 3));
+}
+
+glm::dvec3 geometric_normal(const LspTriangle& t) {
+  return glm::normalize(glm::cross(vec(t.v1) - vec(t.v0), vec(t.v2) - vec(t.v0)));
+}
+
+}  // namespace
+
+SurfaceRays::SurfaceRays(const Baked& baked) : baked_(baked), offset_(kOffset * diagonal(baked.header)) {
+  // Records that spatial splits repeat count more than once: harmless here, and it spares a set of
+  // primitives.
+  double total = 0;
+  for (const LspTriangle& t : baked.triangles) {
+    total += glm::length(glm::cross(vec(t.v1) - vec(t.v0), vec(t.v2) - vec(t.v0)));
+    area_.push_back(total);
+  }
+}
+
+LspRay SurfaceRays::make(uint64_t point, uint64_t ray) const {
+  const double wanted = random(point, 0) * area_.back();
+  const auto i = size_t(std::lower_bound(area_.begin(), area_.end(), wanted) - area_.begin());
+  const LspTriangle& t = baked_.triangles[std::min(i, area_.size() - 1)];
+  double u = random(point, 1), v = random(point, 2);
+  if (u + v > 1) {
+    u = 1 - u;
+    v = 1 - v;
+  }
+  const glm::dvec3 a = vec(t.v1) - vec(t.v0), b = vec(t.v2) - vec(t.v0);
+  const glm::dvec3 n = geometric_normal(t);
+  const glm::dvec3 o = vec(t.v0) + a * u + b * v + n * offset_;
+  return {f3(o), 0, f3(cosine_direction(n, ray)), INFINITY};
+}
+
+std::vector<LspRay> surface_rays(const Baked& baked, uint32_t points, uint32_t per_point) {
+  const SurfaceRays make(baked);
+  std::vector<LspRay> rays;
+  for (uint32_t p = 0; p < points; ++p)
+    for (uint32_t k = 0; k < per_point; ++k) rays.push_back(make.make(p, uint64_t{p} * per_point + k));
+  return rays;
+}
+
+std::vector<LspRay> seen_rays(const Baked& baked, uint32_t points, uint32_t per_point) {
+  const LspHeader& h = baked.header;
+  const glm::dvec3 lo = vec(h.bounds_min), extent = vec(h.bounds_max) - lo;
+  const lsp_scene scene = view(baked);
+  std::vector<uint32_t> records(h.primitive_count);
+  for (size_t i = 0; i < baked.triangles.size(); ++i) records[baked.triangles[i].primitive] = uint32_t(i);
+  std::vector<LspRay> rays;
+  // A sixth of the eyes look from outside; of rays that see nothing there are others.
+  for (uint64_t i = 1; rays.size() < size_t(points) * per_point && i < 16ull * points; ++i) {
+    const uint64_t seed = i + (uint64_t{1} << 40);
+    const glm::dvec3 inside = lo + extent * glm::dvec3(random(seed, 20), random(seed, 21), random(seed, 22));
+    LspRay look{f3(inside), 0, f3(on_sphere(seed, 23)), INFINITY};
+    if (i % 6 == 0) {
+      const glm::dvec3 eye = lo + 0.5 * extent + on_sphere(seed, 63) * diagonal(h);
+      look.origin = f3(eye);
+      look.direction = f3(inside - eye);
+    }
+    LspHit hit;
+    const lsp_trace_options exact = {0, 0, 0, 0};
+    if (lsp_trace(&scene, &exact, &look, &hit, 1, nullptr, nullptr) != LSP_OK || hit.primitive == LSP_NONE)
+      continue;
+    const glm::dvec3 n = geometric_normal(baked.triangles[records[hit.primitive]]);
+    const glm::dvec3 d = vec(look.direction);
+    // From the back of a closed object nobody sees it.
+    if (glm::dot(n, d) > 0) continue;
+    const glm::dvec3 o = vec(look.origin) + d * double(hit.t) + n * (kOffset * diagonal(h));
+    for (uint32_t k = 0; k < per_point; ++k)
+      rays.push_back({f3(o), 0, f3(cosine_direction(n, seed * per_point + k)), INFINITY});
+  }
+  return rays;
+}
+
+}  // namespace lsp

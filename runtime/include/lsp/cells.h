@@ -1,0 +1,364 @@
+/* Traversal of cells, in the common subset of GLSL 4.6 and C++20; lsp/traverse.h includes it where LSP_CELLS is
+ * defined. Layout: LspCellGrid and what follows it in layout.h.
+ *
+ * A ray goes from cell to cell (Amanatides, Woo, "A Fast Voxel Traversal Algorithm for Ray Tracing", 1987), over
+ * empty ones as far as their jump says (Cohen, Sheffer, "Proximity Clouds", 1994). In the cell it begins in it asks
+ * the origin table of its sub-cell, in others the far table, which is the paper's Line Space (section 3.1). An entry
+ * is empty, a plane, or a split: two answers, and a linear form over the ray's place in the shaft whose sign chooses.
+ * An entry that loses more than asked for is not heeded: the ray is traced exactly through this cell, in the cell's
+ * own small tree, and goes on from there.
+ *
+ * Everything but the exact trace counts in cells: positions from the grid's lower corner, lengths in edges.
+ *
+ * Rounding. The grid's planes are crossed at t off by at most 4 u G edges along an axis (G cells, u = 2^-24), for a
+ * ray that begins within a few extents; a cell's tree holds what comes within the grid's margin of the cell, 1e-4
+ * edges or more, and an exact trace reaches as far beyond the cell's ends. So no triangle is lost between cells.
+ */
+
+/* How far outside its passage a plane hit may lie, as a share of the passage; as in the bake. */
+#define LSP_CELL_SLACK 0.05f
+#define LSP_CELL_STACK 32u
+
+/* Children of nodes that are yet to be visited, from entry 1 on. Entry 0 is LSP_NONE once all work is done: a device
+ * may end loops early, and then only memory tells, see lsp/bvh.h. */
+uint lsp_stack_ref[LSP_CELL_STACK];
+
+/* How far the ray has come: it enters `cell` at t, by a side across `axis`, -1 where it begins there. */
+struct LspWalk {
+  LspBest best;
+  uint ref; /* LSP_LEAF_BIT and the filled cell that it is to be traced exactly in; LSP_NONE: it is answered */
+  ivec3 cell;
+  float t;
+  int axis;
+  float t_last; /* where it leaves the grid, or ends */
+  ivec3 exact_cell; /* of ref; it has come out of it at t */
+  float exact_t;    /* where it entered that */
+  uint step;
+  bool any_hit;
+  LspCounts counts;
+};
+LspWalk lsp_walk;
+
+/* A ray in the grid's coordinates; t is the same. */
+struct LspCellRay {
+  vec3 origin;
+  vec3 direction;
+  vec3 inverse;
+  ivec3 ahead; /* 1: towards larger coordinates */
+};
+
+LSP_FN LspCellRay lsp_cell_ray(LspCellGrid grid, LspSetup s) {
+  precise vec3 origin = (s.origin - lsp_vec3(grid.lo)) * grid.per_size;
+  precise vec3 direction = s.direction * grid.per_size;
+  precise vec3 inverse = s.inverse * grid.size;
+  LspCellRay r;
+  r.origin = origin;
+  r.direction = direction;
+  r.inverse = inverse;
+  r.ahead = ivec3(inverse.x < 0.0f ? 0 : 1, inverse.y < 0.0f ? 0 : 1, inverse.z < 0.0f ? 0 : 1);
+  return r;
+}
+
+LSP_FN vec3 lsp_cell_point(LspCellRay r, float t) {
+  precise vec3 p = r.origin + r.direction * t;
+  return p;
+}
+
+LSP_FN float lsp_along(vec3 v, int axis) { return axis == 0 ? v.x : (axis == 1 ? v.y : v.z); }
+LSP_FN uint lsp_ahead(LspCellRay r, int axis) {
+  return uint(axis == 0 ? r.ahead.x : (axis == 1 ? r.ahead.y : r.ahead.z));
+}
+
+/* The two coordinates of a point on a side across an axis. */
+LSP_FN float lsp_side_u(vec3 p, int axis) { return axis == 0 ? p.y : p.x; }
+LSP_FN float lsp_side_v(vec3 p, int axis) { return axis == 2 ? p.y : p.z; }
+
+LSP_FN vec3 lsp_cell_corner(ivec3 cell) { return vec3(float(cell.x), float(cell.y), float(cell.z)); }
+
+/* Rays from afar are treated as others. */
+LSP_FN bool lsp_is_far(LspScene, LspSetup) { return false; }
+
+/* To the first cell of the ray. */
+LSP_STEP void lsp_begin(LspScene scene, LspSetup s, LspQuery q) {
+  LspCellGrid grid = lsp_load_header(scene).cells;
+  LspCellRay r = lsp_cell_ray(grid, s);
+  vec3 dims = vec3(float(grid.cells_x), float(grid.cells_y), float(grid.cells_z));
+  precise vec3 a = (vec3(0.0f, 0.0f, 0.0f) - r.origin) * r.inverse;
+  precise vec3 b = (dims - r.origin) * r.inverse;
+  vec3 first = vec3(lsp_min(a.x, b.x), lsp_min(a.y, b.y), lsp_min(a.z, b.z));
+  vec3 last = vec3(lsp_max(a.x, b.x), lsp_max(a.y, b.y), lsp_max(a.z, b.z));
+  float t_in = lsp_max(lsp_max(first.x, first.y), first.z);
+  bool outside = t_in > s.tmin;
+  lsp_walk.t_last = lsp_min(lsp_min(lsp_min(last.x, last.y), last.z), s.tmax);
+  lsp_walk.t = outside ? t_in : s.tmin;
+  lsp_walk.axis = !outside ? -1 : (t_in == first.x ? 0 : (t_in == first.y ? 1 : 2));
+  vec3 p = lsp_cell_point(r, lsp_walk.t);
+  lsp_walk.cell = ivec3(int(lsp_min(lsp_max(p.x, 0.0f), dims.x - 0.5f)), int(lsp_min(lsp_max(p.y, 0.0f), dims.y - 0.5f)),
+                 int(lsp_min(lsp_max(p.z, 0.0f), dims.z - 0.5f)));
+  lsp_walk.ref = lsp_walk.t < lsp_walk.t_last ? 0u : LSP_NONE;
+  lsp_walk.exact_cell = lsp_walk.cell;
+  lsp_walk.exact_t = lsp_walk.t;
+  lsp_walk.step = 0u;
+  lsp_walk.best = lsp_no_best(s);
+  lsp_walk.any_hit = (q.flags & LSP_TRACE_ANY_HIT) != 0u;
+  lsp_walk.counts = lsp_no_counts();
+  lsp_stack_ref[0] = lsp_walk.ref;
+}
+
+/* The patch of a coordinate that counts in patches, n of them, and the place in it, from -1 to 1. */
+LSP_FN float lsp_cell_patch(float q, float n) {
+  float i = floor(q > 0.0f ? q : 0.0f);
+  return i < n ? i : n - 1.0f;
+}
+LSP_FN float lsp_cell_place(float q, float first) {
+  precise float place = 2.0f * (q - first) - 1.0f;
+  return place;
+}
+
+/* Where a ray's entry is, and the ray's place in the shaft. */
+struct LspCellLook {
+  uint entry; /* LSP_NONE: there is none */
+  vec4 place;
+  float place_4;
+};
+
+/* In the origin table of the sub-cell that a ray begins in, at `from`; it leaves the cell at `to`. Both are seen from
+ * the cell's lower corner. */
+LSP_FN LspCellLook lsp_cell_origin(LspScene scene, LspCellGrid grid, uint index, vec3 from, vec3 to, int axis,
+                                   uint face) {
+  LspFilledCell cell = lsp_load_cell_origins(scene, index);
+  float n = float(grid.sub_cells);
+  float m = float(grid.origin_patches);
+  precise vec3 p = from * n;
+  vec3 sub = vec3(lsp_cell_patch(p.x, n), lsp_cell_patch(p.y, n), lsp_cell_patch(p.z, n));
+  uint number = uint(sub.x) + grid.sub_cells * (uint(sub.y) + grid.sub_cells * uint(sub.z));
+  precise float u = lsp_side_u(to, axis) * m;
+  precise float v = lsp_side_v(to, axis) * m;
+  float patch_u = lsp_cell_patch(u, m);
+  float patch_v = lsp_cell_patch(v, m);
+  LspCellLook look;
+  look.place = vec4(lsp_cell_place(p.x, sub.x), lsp_cell_place(p.y, sub.y), lsp_cell_place(p.z, sub.z),
+                    lsp_cell_place(u, patch_u));
+  look.place_4 = lsp_cell_place(v, patch_v);
+  uint bit = number & 31u;
+  uint mask = number < 32u ? cell.sub_mask_lo : cell.sub_mask_hi;
+  uint table = cell.sub_first + uint(bitCount(mask & ((1u << bit) - 1u))) +
+               (number < 32u ? 0u : uint(bitCount(cell.sub_mask_lo)));
+  uint patches = grid.origin_patches * grid.origin_patches;
+  look.entry = ((mask >> bit) & 1u) == 0u
+                   ? LSP_NONE
+                   : grid.origin_entry_first + (table * 6u + face) * patches + uint(patch_u) +
+                         grid.origin_patches * uint(patch_v);
+  return look;
+}
+
+/* In the far table of a cell that a ray passes from `from` to `to`. */
+LSP_FN LspCellLook lsp_cell_far(LspCellGrid grid, uint index, vec3 from, vec3 to, int axis_in, uint face_in,
+                                int axis_out, uint face_out) {
+  float n = float(grid.far_patches);
+  precise float in_u = lsp_side_u(from, axis_in) * n;
+  precise float in_v = lsp_side_v(from, axis_in) * n;
+  precise float out_u = lsp_side_u(to, axis_out) * n;
+  precise float out_v = lsp_side_v(to, axis_out) * n;
+  vec4 first = vec4(lsp_cell_patch(in_u, n), lsp_cell_patch(in_v, n), lsp_cell_patch(out_u, n), lsp_cell_patch(out_v, n));
+  LspCellLook look;
+  look.place = vec4(lsp_cell_place(in_u, first.x), lsp_cell_place(in_v, first.y), lsp_cell_place(out_u, first.z),
+                    lsp_cell_place(out_v, first.w));
+  look.place_4 = 0.0f;
+  uint patches = grid.far_patches * grid.far_patches;
+  uint shaft = LSP_SHAFT_INDEX(face_in, face_out, uint(first.x) + grid.far_patches * uint(first.y),
+                               uint(first.z) + grid.far_patches * uint(first.w), grid.far_patches);
+  /* In and out by one face, along an edge, there is nothing between. */
+  look.entry = face_in == face_out ? LSP_NONE : index * (30u * patches * patches) + shaft;
+  return look;
+}
+
+LSP_FN float lsp_split_weight(uint bits, uint shift) { return float(int(bits << (26u - shift)) >> 26); }
+
+/* The linear form of a split at a place. */
+LSP_FN float lsp_split_side(LspSplit split, vec4 place, float place_4) {
+  float w0 = lsp_split_weight(split.weights, 0u);
+  float w1 = lsp_split_weight(split.weights, 6u);
+  float w2 = lsp_split_weight(split.weights, 12u);
+  float w3 = lsp_split_weight(split.weights, 18u);
+  float w4 = lsp_split_weight(split.weights, 24u);
+  float constant = lsp_split_weight(split.answers, 24u);
+  precise float side = constant + w0 * place.x + w1 * place.y + w2 * place.z + w3 * place.w + w4 * place_4;
+  return side;
+}
+
+/* The plane of the cell that an answer comes to; LSP_NONE: none. */
+LSP_FN uint lsp_cell_plane(LspScene scene, LspFilledCell cell, uint answer, LspCellLook look) {
+  if (answer < cell.plane_count) return cell.plane_first + answer;
+  LspSplit split = lsp_load_split(scene, cell.split_first + (answer - cell.plane_count));
+  bool first = lsp_split_side(split, look.place, look.place_4) > 0.0f;
+  uint side = (first ? split.answers : split.answers >> 12u) & LSP_SPLIT_MASK;
+  return side < cell.plane_count ? cell.plane_first + side : LSP_NONE;
+}
+
+/* Where a ray meets a plane within its passage of a cell, from t_in to t_out; infinity: not. `origin` is the ray's, seen
+ * from the cell's centre. */
+LSP_FN float lsp_cell_meet(LspPlane plane, vec3 origin, vec3 direction, bool begins, float t_in, float t_out) {
+  vec3 normal = lsp_vec3(plane.normal);
+  precise float t = (plane.distance - lsp_dot(normal, origin)) / lsp_dot(normal, direction);
+  precise float slack = LSP_CELL_SLACK * (t_out - t_in);
+  if (!(t > (begins ? t_in : t_in - slack) && t <= t_out + slack)) return LSP_INFINITY;
+  t = t < t_in ? t_in : t;
+  return t > t_out ? t_out : t;
+}
+
+LSP_FN int lsp_cell_within(float p, int cell, int jump) {
+  int i = int(floor(p));
+  return i < cell - jump ? cell - jump : (i > cell + jump ? cell + jump : i);
+}
+
+/* From cell to cell until a table answers, or a cell is to be traced exactly, or the ray is over. */
+LSP_STEP void lsp_advance(LspScene scene, LspSetup s, LspQuery q) {
+  LspCellGrid grid = lsp_load_header(scene).cells;
+  LspCellRay r = lsp_cell_ray(grid, s);
+  ivec3 cell = lsp_walk.cell;
+  float t = lsp_walk.t;
+  int axis = lsp_walk.axis;
+  uint step = lsp_walk.step;
+  uint most = grid.cells_x + grid.cells_y + grid.cells_z;
+  uint exact = LSP_NONE;
+  bool over = lsp_walk.best.triangle != LSP_NONE;
+  while (!over && exact == LSP_NONE && step < most) {
+    over = !(t < lsp_walk.t_last) || uint(cell.x) >= grid.cells_x || uint(cell.y) >= grid.cells_y || uint(cell.z) >= grid.cells_z;
+    if (over) break;
+    ++step;
+    uint word = lsp_load_cell_word(scene, (uint(cell.z) * grid.cells_y + uint(cell.y)) * grid.cells_x + uint(cell.x));
+    bool filled = (word & LSP_CELL_FILLED) != 0u;
+    int jump = filled ? 0 : int(word & LSP_CELL_MAX_JUMP);
+    ivec3 side = cell + r.ahead * (1 + 2 * jump) - ivec3(jump, jump, jump);
+    precise vec3 t_side = (lsp_cell_corner(side) - r.origin) * r.inverse;
+    int axis_out = t_side.x <= t_side.y ? (t_side.x <= t_side.z ? 0 : 2) : (t_side.y <= t_side.z ? 1 : 2);
+    float t_out = lsp_max(lsp_along(t_side, axis_out), t);
+    vec3 point = lsp_cell_point(r, t_out);
+    if (filled) {
+      lsp_walk.counts.shafts += 1u;
+      uint index = word & ~LSP_CELL_FILLED;
+      bool begins = axis < 0;
+      vec3 corner = lsp_cell_corner(cell);
+      vec3 from = lsp_cell_point(r, t) - corner;
+      uint face_out = 2u * uint(axis_out) + lsp_ahead(r, axis_out);
+      LspCellLook look;
+      if (begins)
+        look = lsp_cell_origin(scene, grid, index, from, point - corner, axis_out, face_out);
+      else
+        look = lsp_cell_far(grid, index, from, point - corner, axis, 2u * uint(axis) + 1u - lsp_ahead(r, axis), axis_out, face_out);
+      uint entry = LSP_ANSWER_EMPTY | (begins ? LSP_LOSS_UNKNOWN << LSP_LOSS_SHIFT : 0u);
+      if (look.entry != LSP_NONE) entry = lsp_load_entry(scene, look.entry);
+      uint answer = entry & LSP_ANSWER_MASK;
+      if ((entry >> LSP_LOSS_SHIFT) >= (begins ? q.dial & 0xFFu : q.dial >> 8u)) {
+        exact = index;
+        lsp_walk.exact_cell = cell;
+        lsp_walk.exact_t = t;
+      } else if (answer < LSP_ANSWER_LIMIT) {
+        LspFilledCell answers = lsp_load_cell_answers(scene, index);
+        lsp_walk.counts.splits += answer < answers.plane_count ? 0u : 1u;
+        uint plane = lsp_cell_plane(scene, answers, answer, look);
+        if (plane != LSP_NONE) {
+          precise vec3 origin = r.origin - (corner + 0.5f);
+          float hit = lsp_cell_meet(lsp_load_plane(scene, plane), origin, r.direction, begins, t, t_out);
+          if (hit > s.tmin && hit < s.tmax) {
+            lsp_walk.best.t = hit;
+            lsp_walk.best.triangle = lsp_load_plane_record(scene, plane);
+            lsp_walk.best.flags = LSP_HIT_LINE_SPACE | (begins ? LSP_HIT_ORIGIN_INSIDE : 0u);
+            over = true;
+          }
+        }
+      } else {
+        over = answer == LSP_ANSWER_SKY;
+      }
+    }
+    ivec3 next = cell + r.ahead * (2 + 2 * jump) - ivec3(jump + 1, jump + 1, jump + 1);
+    cell = ivec3(axis_out == 0 ? next.x : lsp_cell_within(point.x, cell.x, jump),
+                 axis_out == 1 ? next.y : lsp_cell_within(point.y, cell.y, jump),
+                 axis_out == 2 ? next.z : lsp_cell_within(point.z, cell.z, jump));
+    t = t_out;
+    axis = axis_out;
+  }
+  lsp_walk.counts.nodes += step - lsp_walk.step;
+  lsp_walk.cell = cell;
+  lsp_walk.t = t;
+  lsp_walk.axis = axis;
+  lsp_walk.step = step;
+  lsp_walk.ref = exact == LSP_NONE ? LSP_NONE : exact | LSP_LEAF_BIT;
+  if (over) lsp_stack_ref[0] = LSP_NONE;
+}
+
+/* Where a ray enters a box of a cell's tree, not before t_first; infinity where it misses it up to t_last. `unit` is
+ * the box's unit along the ray, plus and minus are the cell's corner from the origin moved outwards. */
+LSP_FN float lsp_cell_box(vec3 lo, vec3 hi, vec3 unit, vec3 plus, vec3 minus, float t_first, float t_last) {
+  precise vec3 a = lo * unit + plus;
+  precise vec3 b = hi * unit + minus;
+  float t_in = lsp_max(lsp_max(lsp_min(a.x, b.x), lsp_min(a.y, b.y)), lsp_max(lsp_min(a.z, b.z), t_first));
+  float t_out = lsp_min(lsp_min(lsp_max(a.x, b.x), lsp_max(a.y, b.y)), lsp_min(lsp_max(a.z, b.z), t_last));
+  return t_in <= t_out ? t_in : LSP_INFINITY;
+}
+
+LSP_FN float lsp_byte(uint word, uint shift) { return float((word >> shift) & 0xFFu); }
+
+/* Traces the cell of lsp_walk.ref exactly: its closest triangle, or any, between where the ray entered it and left it. */
+LSP_STEP void lsp_test_leaf(LspScene scene, LspSetup s) {
+  LspCellGrid grid = lsp_load_header(scene).cells;
+  LspFilledCell tree = lsp_load_cell_tree(scene, lsp_walk.ref & ~LSP_LEAF_BIT);
+  precise float reach = grid.margin / s.speed; /* along no axis more than the margin */
+  s.tmin = lsp_max(s.tmin, lsp_walk.exact_t - reach);
+  s.tmax = lsp_min(s.tmax, lsp_walk.t + reach);
+  LspBest best = lsp_no_best(s);
+  precise vec3 corner = lsp_vec3(grid.lo) - vec3(grid.margin, grid.margin, grid.margin) + lsp_cell_corner(lsp_walk.exact_cell) * grid.size;
+  precise vec3 unit = s.inverse * grid.box_step;
+  precise vec3 plus = (corner - s.origin_plus) * s.inverse;
+  precise vec3 minus = (corner - s.origin_minus) * s.inverse;
+  uint top = 1u;
+  uint ref = tree.root;
+  uint step = 0u;
+  lsp_walk.counts.exact += 1u;
+  while (ref != LSP_CELL_NO_CHILD) {
+    while (ref < LSP_CELL_LEAF_BIT && step < tree.max_steps) {
+      ++step;
+      LspCellNode n = lsp_load_cell_node(scene, tree.node_first + ref);
+      float t0 = lsp_cell_box(vec3(lsp_byte(n.box_0, 0u), lsp_byte(n.box_0, 8u), lsp_byte(n.box_0, 16u)),
+                              vec3(lsp_byte(n.box_0, 24u), lsp_byte(n.box_1, 0u), lsp_byte(n.box_1, 8u)), unit, plus, minus, s.tmin, best.t);
+      float t1 = lsp_cell_box(vec3(lsp_byte(n.box_1, 16u), lsp_byte(n.box_1, 24u), lsp_byte(n.box_2, 0u)),
+                              vec3(lsp_byte(n.box_2, 8u), lsp_byte(n.box_2, 16u), lsp_byte(n.box_2, 24u)), unit, plus, minus, s.tmin, best.t);
+      bool in0 = t0 <= best.t;
+      bool in1 = t1 <= best.t;
+      uint nearer = t0 <= t1 ? n.children & 0xFFFFu : n.children >> 16u;
+      if (in0 && in1) {
+        lsp_stack_ref[top] = t0 <= t1 ? n.children >> 16u : n.children & 0xFFFFu;
+        top = top + 1u < LSP_CELL_STACK ? top + 1u : top;
+      } else if (!in0 && !in1) {
+        nearer = LSP_CELL_NO_CHILD;
+        if (top > 1u) {
+          --top;
+          nearer = lsp_stack_ref[top];
+        }
+      }
+      ref = nearer;
+    }
+    if (ref < LSP_CELL_LEAF_BIT || ref == LSP_CELL_NO_CHILD) break;
+    uint first = tree.reference_first + (ref & (LSP_CELL_MAX_REFERENCES - 1u));
+    uint count = ((ref >> LSP_CELL_LEAF_COUNT_SHIFT) & 3u) + 1u;
+    lsp_walk.counts.triangles += count;
+    for (uint i = 0u; i < count; ++i) best = lsp_triangle(scene, s, lsp_load_cell_reference(scene, first + i), best);
+    ref = LSP_CELL_NO_CHILD;
+    if (top > 1u && !(lsp_walk.any_hit && best.triangle != LSP_NONE)) {
+      --top;
+      ref = lsp_stack_ref[top];
+    }
+  }
+  lsp_walk.counts.exact_nodes += step;
+  if (best.triangle != LSP_NONE) lsp_walk.best = best;
+  lsp_walk.ref = 0u; /* go on */
+}
+
+/* Look-ups are made on the way. */
+LSP_STEP void lsp_look_up(LspScene, LspSetup, LspQuery) {}
+
+LSP_STEP LspBest lsp_end() {
+  lsp_walk.best.complete = lsp_stack_ref[0] == LSP_NONE;
+  return lsp_walk.best;
+}

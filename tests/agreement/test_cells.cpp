@@ -1,0 +1,232 @@
+// Cells: CPU and Vulkan give the same bits, tables alone answer most rays, the dial goes to near exact, and
+// exact rays are those of a BVH.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+
+#include <tbb/global_control.h>
+
+#include "../baker/shapes.h"
+#include "bake.h"
+#include "lsp/lsp.h"
+#include "lsp/lsp_vulkan.h"
+#include "lsp/scene_file.hpp"
+#include "lsp/vulkan_device.hpp"
+#include "rays.h"
+#include "surface_rays.h"
+#include "writer.h"
+
+namespace lsp::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A ball in a room of single-sheet walls.
+Mesh room() {
+  Mesh mesh = sphere(24);
+  for (int axis = 0; axis < 3; ++axis)
+    for (const float side : {-2.5f, 2.5f}) {
+      const auto corner = [&](float u, float v) {
+        glm::vec3 p;
+        p[axis] = side;
+        p[(axis + 1) % 3] = u;
+        p[(axis + 2) % 3] = v;
+        return p;
+      };
+      const glm::vec3 a = corner(-2.5f, -2.5f), b = corner(2.5f, -2.5f), c = corner(2.5f, 2.5f),
+                      d = corner(-2.5f, 2.5f);
+      if (side > 0) {
+        add_triangle(mesh, a, c, b);
+        add_triangle(mesh, a, d, c);
+      } else {
+        add_triangle(mesh, a, b, c);
+        add_triangle(mesh, a, c, d);
+      }
+    }
+  return mesh;
+}
+
+BakeOptions options_of_cells() {
+  BakeOptions options;
+  options.base = Base::kCells;
+  options.cells = 8;
+  return options;
+}
+
+const lsp::Baked& baked_room() {
+  static const lsp::Baked baked = bake(room(), options_of_cells());
+  return baked;
+}
+
+std::vector<LspHit> trace(const lsp_scene& scene, const lsp_trace_options& options,
+                          const std::vector<LspRay>& rays, lsp_trace_counts* counts = nullptr) {
+  std::vector<LspHit> hits(rays.size());
+  lsp_error error;
+  EXPECT_EQ(lsp_trace(&scene, &options, rays.data(), hits.data(), rays.size(), counts, &error), LSP_OK)
+      << error.message;
+  return hits;
+}
+
+lsp_trace_options tables_but(float max_loss, uint32_t flags = 0) {
+  return {LSP_TRACE_APPROXIMATE | LSP_TRACE_MAX_LOSS | flags, 0, 0, max_loss};
+}
+
+double wrong_share(const std::vector<LspHit>& answers, const std::vector<LspHit>& truth) {
+  size_t wrong = 0;
+  for (size_t i = 0; i < truth.size(); ++i)
+    wrong += (answers[i].primitive == LSP_NONE) != (truth[i].primitive == LSP_NONE);
+  return double(wrong) / double(truth.size());
+}
+
+bool same_bits(const std::vector<LspHit>& a, const std::vector<LspHit>& b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(LspHit)) == 0;
+}
+
+TEST(Cells, DialGoesFromTablesAloneToNearExact) {
+  const lsp_scene scene = view(baked_room());
+  const std::vector<LspRay> rays = surface_rays(baked_room(), 8192, 4);
+  const auto truth = trace(scene, {0, 0}, rays);
+  double before = 1;
+  uint64_t calls_before = 0;
+  for (const float loss : {100.0f, 10.0f, 2.0f, 0.0f}) {
+    lsp_trace_counts counts{};
+    const double wrong = wrong_share(trace(scene, tables_but(loss), rays, &counts), truth);
+    EXPECT_LE(wrong, before + 0.001) << loss;
+    EXPECT_GE(counts.exact, calls_before) << loss;
+    before = wrong;
+    calls_before = counts.exact;
+    if (loss == 100) {
+      EXPECT_LT(wrong, 0.05);
+      EXPECT_EQ(counts.exact, 0u);
+      EXPECT_EQ(counts.triangles, 0u);
+    }
+    if (loss == 0) {
+      EXPECT_LT(wrong, 0.002);
+    }
+    EXPECT_EQ(counts.rays, rays.size());
+    EXPECT_GT(counts.shafts, 0u);
+  }
+}
+
+TEST(Cells, QualitiesErrAsTheBakePromises) {
+  const lsp_scene scene = view(baked_room());
+  const std::vector<LspRay> rays = surface_rays(baked_room(), 20000, 1);
+  const auto truth = trace(scene, {0, 0}, rays);
+  const double fast = wrong_share(trace(scene, {LSP_TRACE_APPROXIMATE, 0, LSP_QUALITY_FAST}, rays), truth);
+  const double balanced =
+      wrong_share(trace(scene, {LSP_TRACE_APPROXIMATE, 0, LSP_QUALITY_BALANCED}, rays), truth);
+  const double accurate =
+      wrong_share(trace(scene, {LSP_TRACE_APPROXIMATE, 0, LSP_QUALITY_ACCURATE}, rays), truth);
+  EXPECT_LE(balanced, 0.012);
+  EXPECT_LE(accurate, 0.006);
+  EXPECT_LE(balanced, fast);
+}
+
+TEST(Cells, ExactRaysAreThoseOfABvh) {
+  BakeOptions options;
+  options.line_spaces = false;
+  const lsp::Baked bvh = bake(room(), options);
+  const std::vector<LspRay> rays = hard_rays(bvh.triangles, 5000, 3);
+  EXPECT_TRUE(same_bits(trace(view(baked_room()), {0, 0}, rays), trace(view(bvh), {0, 0}, rays)));
+}
+
+TEST(Cells, AnswersLieInTheInterval) {
+  const lsp_scene scene = view(baked_room());
+  std::vector<LspRay> rays = surface_rays(baked_room(), 4000, 1);
+  for (size_t i = 0; i < rays.size(); ++i) {
+    rays[i].tmin = 0.1f * static_cast<float>(i % 7);
+    rays[i].tmax = 0.3f + 0.5f * static_cast<float>(i % 5);
+  }
+  for (const float loss : {100.0f, 0.0f})
+    for (const uint32_t any : {0u, LSP_TRACE_ANY_HIT}) {
+      const auto hits = trace(scene, tables_but(loss, any), rays);
+      for (size_t i = 0; i < rays.size(); ++i)
+        EXPECT_TRUE(hits[i].primitive == LSP_NONE || (hits[i].t > rays[i].tmin && hits[i].t < rays[i].tmax))
+            << i;
+    }
+}
+
+TEST(Cells, RaysFromOutsideAndFromEmptyCells) {
+  const lsp_scene scene = view(baked_room());
+  std::vector<LspRay> rays;
+  for (const LspRay& r : surface_rays(baked_room(), 4000, 1)) {
+    // Towards the same points from far outside, and from the middle between ball and wall.
+    rays.push_back({{r.direction.x * 9, r.direction.y * 9, r.direction.z * 9},
+                    0,
+                    {-r.direction.x, -r.direction.y, -r.direction.z},
+                    INFINITY});
+    rays.push_back(
+        {{1.7f * r.direction.x, 1.7f * r.direction.y, 1.7f * r.direction.z}, 0, r.direction, INFINITY});
+  }
+  const auto truth = trace(scene, {0, 0}, rays);
+  EXPECT_LT(wrong_share(trace(scene, tables_but(0), rays), truth), 0.005);
+  EXPECT_LT(wrong_share(trace(scene, tables_but(100), rays), truth), 0.05);
+}
+
+TEST(Cells, TablesAloneNeedNoTriangles) {
+  lsp::Baked alone = bake(room(), options_of_cells());
+  keep_tables_only(alone);
+  EXPECT_EQ(alone.nodes.size() + alone.cell_tables.nodes.size() + alone.cell_tables.references.size(), 0u);
+  const std::vector<LspRay> rays = surface_rays(baked_room(), 4000, 1);
+  EXPECT_TRUE(same_bits(trace(view(alone), {LSP_TRACE_APPROXIMATE, 0}, rays),
+                        trace(view(baked_room()), tables_but(100), rays)));
+  lsp_error error;
+  LspHit hit;
+  const lsp_scene scene = view(alone);
+  const lsp_trace_options exact{0, 0};
+  EXPECT_EQ(lsp_trace(&scene, &exact, rays.data(), &hit, 1, nullptr, &error), LSP_ERROR_UNSUPPORTED);
+}
+
+TEST(Cells, SameTablesWithAnyNumberOfThreads) {
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  const lsp::Baked single = bake(room(), options_of_cells());
+  const lsp::Baked& many = baked_room();
+  EXPECT_EQ(single.cell_tables.entries, many.cell_tables.entries);
+  EXPECT_EQ(single.cell_grid.words, many.cell_grid.words);
+  EXPECT_EQ(single.cell_tables.plane_records, many.cell_tables.plane_records);
+  EXPECT_EQ(std::memcmp(single.header.quality, many.header.quality, sizeof many.header.quality), 0);
+}
+
+class CellsOnVulkan : public testing::TestWithParam<uint32_t> {};
+
+TEST_P(CellsOnVulkan, SameBits) {
+  std::string why;
+  if (!VulkanTracer::available(&why)) GTEST_SKIP() << why;
+  const std::string path =
+      (fs::temp_directory_path() / ("lsp_test_cells_" + std::to_string(getpid()) + ".lsp")).string();
+  lsp::Baked baked = bake(room(), options_of_cells());
+  write_lsp(path, baked, "{}", {});
+  {
+    const SceneFile file(path);
+    std::vector<LspRay> rays = surface_rays(baked, 12000, 1);
+    const std::vector<LspRay> hard = hard_rays(baked.triangles, 2600, 3);
+    rays.insert(rays.end(), hard.begin(), hard.end());
+    std::vector<LspHit> gpu(rays.size());
+    VulkanTracer tracer;
+    tracer.load(file.scene(), LSP_USE_APPROXIMATE | LSP_USE_EXACT | GetParam());
+    std::vector<lsp_trace_options> all = {{0, 0}, {LSP_TRACE_ANY_HIT, 0}};
+    for (const uint32_t quality : {LSP_QUALITY_FAST, LSP_QUALITY_BALANCED, LSP_QUALITY_ACCURATE})
+      all.push_back({LSP_TRACE_APPROXIMATE, 0, quality});
+    for (const float loss : {0.0f, 5.0f, 100.0f})
+      for (const uint32_t any : {0u, LSP_TRACE_ANY_HIT}) all.push_back(tables_but(loss, any));
+    for (const lsp_trace_options& options : all) {
+      lsp_trace_counts counts{};
+      const auto cpu = trace(file.scene(), options, rays, &counts);
+      const VulkanTrace traced = tracer.trace(options, rays, gpu, true);
+      EXPECT_TRUE(same_bits(cpu, gpu)) << options.flags << " " << options.max_loss;
+      EXPECT_EQ(traced.counts.nodes, counts.nodes);
+      EXPECT_EQ(traced.counts.shafts, counts.shafts);
+      EXPECT_EQ(traced.counts.splits, counts.splits);
+      EXPECT_EQ(traced.counts.exact, counts.exact);
+      EXPECT_EQ(traced.counts.triangles, counts.triangles);
+    }
+  }
+  fs::remove(path);
+}
+INSTANTIATE_TEST_SUITE_P(Loads, CellsOnVulkan, testing::Values(0u, LSP_USE_ADDRESSES_ALWAYS));
+
+}  // namespace
+}  // namespace lsp::test
