@@ -1,5 +1,6 @@
 // Cells: the grid's words, what each filled cell owns, its tree, and the entries of its tables. Needs every
 // section of cells to be usable, and a grid in range.
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <vector>
@@ -40,6 +41,7 @@ class CellCheck {
 
   // Filled cells are numbered in the order of the grid; within a jump there is none.
   void check_words() {
+    sum_filled();
     uint32_t filled = 0;
     for (uint64_t i = 0; i < words_.size(); ++i) {
       const uint32_t word = words_[i];
@@ -59,16 +61,34 @@ class CellCheck {
            std::to_string(filled) + " cells are filled, " + std::to_string(cells_.size()) + " have a record");
   }
 
-  bool jump_is_true(uint64_t i, uint32_t jump) const {
+  // Filled cells below (x, y, z) along every axis, for all corners of cells, so that a box of any size is counted
+  // by eight look-ups (Crow, "Summed-area tables for texture mapping", 1984): a jump may be as long as the grid.
+  void sum_filled() {
+    const uint64_t row = uint64_t{grid_.cells_x} + 1, slice = row * (uint64_t{grid_.cells_y} + 1);
+    sums_.assign(slice * (uint64_t{grid_.cells_z} + 1), 0);
+    uint64_t i = 0;
+    for (uint64_t z = 1; z <= grid_.cells_z; ++z)
+      for (uint64_t y = 1; y <= grid_.cells_y; ++y) {
+        uint32_t in_row = 0;
+        for (uint64_t x = 1; x <= grid_.cells_x; ++x) {
+          in_row += words_[i++] >> 31;
+          const uint64_t at = z * slice + y * row + x;
+          sums_[at] = in_row + sums_[at - row] + sums_[at - slice] - sums_[at - slice - row];
+        }
+      }
+  }
+
+  bool jump_is_true(uint64_t i, uint64_t jump) const {
+    const uint64_t row = uint64_t{grid_.cells_x} + 1, slice = row * (uint64_t{grid_.cells_y} + 1);
+    const auto first = [&](uint64_t at) { return at > jump ? at - jump : 0; };
+    const auto end = [&](uint64_t at, uint64_t cells) { return std::min(at + jump + 1, cells); };
     const uint64_t x = i % grid_.cells_x, y = i / grid_.cells_x % grid_.cells_y,
                    z = i / grid_.cells_x / grid_.cells_y;
-    const auto from = [&](uint64_t at) { return at > jump ? at - jump : 0; };
-    const auto to = [&](uint64_t at, uint32_t cells) { return std::min<uint64_t>(at + jump, cells - 1); };
-    for (uint64_t c = from(z); c <= to(z, grid_.cells_z); ++c)
-      for (uint64_t b = from(y); b <= to(y, grid_.cells_y); ++b)
-        for (uint64_t a = from(x); a <= to(x, grid_.cells_x); ++a)
-          if (words_[(c * grid_.cells_y + b) * grid_.cells_x + a] & LSP_CELL_FILLED) return false;
-    return true;
+    const uint64_t x0 = first(x), x1 = end(x, grid_.cells_x);
+    const uint64_t y0 = first(y) * row, y1 = end(y, grid_.cells_y) * row;
+    const uint64_t z0 = first(z) * slice, z1 = end(z, grid_.cells_z) * slice;
+    const auto line = [&](uint64_t at) { return sums_[at + x1] - sums_[at + x0]; };
+    return line(z1 + y1) - line(z1 + y0) - line(z0 + y1) + line(z0 + y0) == 0;
   }
 
   // What the cells own follows one another without gaps.
@@ -213,6 +233,7 @@ class CellCheck {
   std::span<const LspFilledCell> cells_;
   std::span<const uint32_t> entries_;
   std::span<const LspCellNode> nodes_;
+  std::vector<uint32_t> sums_;  // see sum_filled
   bool owned_ = true;
 };
 

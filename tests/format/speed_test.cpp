@@ -10,6 +10,7 @@
 #include <fstream>
 #include <functional>
 
+#include "cells_scenes.h"
 #include "check.h"
 #include "file.h"
 #include "hash.h"
@@ -176,6 +177,29 @@ TEST(Speed, StructureCostsNoMoreThanFourTimesReadingAndHashing) {
 #endif
   expect_fast(LargeScene().build(), "BVH with Line Spaces");
   expect_fast(large_ntree(), "NTree without Line Spaces");
+}
+
+// The jumps of a large grid with one filled cell are as long as they can be: a check that looks at every cell of
+// every jump would take hours.
+TEST(Speed, JumpsOfALargeGridOfCells) {
+  constexpr uint32_t kN = 128;
+  Image image = full_cells_scene(true);
+  LspCellGrid& g = image.header.cells;
+  g.cells_x = g.cells_y = g.cells_z = kN;
+  image.cell_words.clear();
+  for (uint32_t z = 0; z < kN; ++z)
+    for (uint32_t y = 0; y < kN; ++y)
+      for (uint32_t x = 0; x < kN; ++x) image.cell_words.push_back(std::max({x, y, z, 1u}) - 1);
+  image.cell_words[0] = LSP_CELL_FILLED;
+  const auto findings_of = [&] {
+    const Bytes bytes = encode(image);
+    size_t findings = 0;
+    EXPECT_LT(seconds([&] { findings = check_file(bytes).findings().size(); }), 10);
+    return findings;
+  };
+  EXPECT_EQ(findings_of(), 0u);
+  ++image.cell_words.back();  // over the filled one
+  EXPECT_EQ(findings_of(), 1u);
 }
 
 }  // namespace
