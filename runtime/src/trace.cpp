@@ -26,6 +26,18 @@ extern "C" uint32_t lsp_dial(const lsp_scene* scene, const lsp_trace_options* op
   return options->max_loss >= 100 ? LSP_DIAL_TABLES : LSP_DIAL(classes, classes);
 }
 
+extern "C" void lsp_add_counts(lsp_trace_counts* sum, const lsp_trace_counts* more) {
+  sum->rays += more->rays;
+  sum->invalid += more->invalid;
+  sum->hits += more->hits;
+  sum->nodes += more->nodes;
+  sum->shafts += more->shafts;
+  sum->triangles += more->triangles;
+  sum->splits += more->splits;
+  sum->exact += more->exact;
+  sum->exact_nodes += more->exact_nodes;
+}
+
 extern "C" lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options* options, const LspRay* rays,
                                 LspHit* hits, uint64_t count, lsp_trace_counts* counts, lsp_error* error) {
   const uint32_t features = scene->header->required_features;

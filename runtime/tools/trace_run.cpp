@@ -21,18 +21,6 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-void add(lsp_trace_counts& sum, const lsp_trace_counts& other) {
-  sum.rays += other.rays;
-  sum.invalid += other.invalid;
-  sum.hits += other.hits;
-  sum.nodes += other.nodes;
-  sum.shafts += other.shafts;
-  sum.triangles += other.triangles;
-  sum.splits += other.splits;
-  sum.exact += other.exact;
-  sum.exact_nodes += other.exact_nodes;
-}
-
 // One line on standard error, rewritten at most five times a second, once a second has passed.
 class ProgressLine {
  public:
@@ -93,7 +81,7 @@ void trace_cpu(const lsp_scene& scene, const TraceRequest& request, std::span<co
     if (error.status != LSP_OK) throw Failure(static_cast<Exit>(error.status), "", error.message);
   }
   if (counts == nullptr) return;
-  for (const lsp_trace_counts& sum : sums) add(*counts, sum);
+  for (const lsp_trace_counts& sum : sums) lsp_add_counts(counts, &sum);
 }
 
 TraceReport trace_on_cpu(const lsp_scene& scene, const TraceRequest& request, std::span<const LspRay> rays,

@@ -22,6 +22,9 @@ static_assert(is_counter(offsetof(lsp_trace_counts, hits), LSP_COUNTER_HITS));
 static_assert(is_counter(offsetof(lsp_trace_counts, nodes), LSP_COUNTER_NODES));
 static_assert(is_counter(offsetof(lsp_trace_counts, shafts), LSP_COUNTER_SHAFTS));
 static_assert(is_counter(offsetof(lsp_trace_counts, triangles), LSP_COUNTER_TRIANGLES));
+static_assert(is_counter(offsetof(lsp_trace_counts, splits), LSP_COUNTER_SPLITS));
+static_assert(is_counter(offsetof(lsp_trace_counts, exact), LSP_COUNTER_EXACT));
+static_assert(is_counter(offsetof(lsp_trace_counts, exact_nodes), LSP_COUNTER_EXACT_NODES));
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -401,14 +404,7 @@ void VulkanTracer::Impl::retrace(const lsp_trace_options& options, std::span<con
         lsp_trace(&scene_, &options, &rays[i], &hits[i], 1, count ? &counts : nullptr, &error);
     if (status != LSP_OK) throw Failure(static_cast<Exit>(status), "", error.message);
     ++result.retraced;
-    result.counts.invalid += counts.invalid;
-    result.counts.hits += counts.hits;
-    result.counts.nodes += counts.nodes;
-    result.counts.shafts += counts.shafts;
-    result.counts.triangles += counts.triangles;
-    result.counts.splits += counts.splits;
-    result.counts.exact += counts.exact;
-    result.counts.exact_nodes += counts.exact_nodes;
+    lsp_add_counts(&result.counts, &counts);
   }
 }
 
@@ -453,20 +449,13 @@ VulkanTrace VulkanTracer::Impl::trace(const lsp_trace_options& wanted, std::span
     if (count) {
       lsp_trace_counts counts;
       memcpy(&counts, counters_.mapped(), sizeof counts);
-      result.counts.invalid += counts.invalid;
-      result.counts.hits += counts.hits;
-      result.counts.nodes += counts.nodes;
-      result.counts.shafts += counts.shafts;
-      result.counts.triangles += counts.triangles;
-      result.counts.splits += counts.splits;
-      result.counts.exact += counts.exact;
-      result.counts.exact_nodes += counts.exact_nodes;
+      lsp_add_counts(&result.counts, &counts);
     }
     ++result.batches;
   }
-  result.counts.rays = rays.size();
   options.flags |= wanted.flags & LSP_TRACE_MAX_LOSS;
   retrace(options, rays, hits, count, result);
+  result.counts.rays = rays.size();  // those retraced are not counted twice
   result.seconds = seconds_since(start);
   return result;
 }

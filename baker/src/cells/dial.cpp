@@ -34,13 +34,7 @@ std::vector<LspHit> trace(const lsp_scene& scene, const lsp_trace_options& optio
     lsp_trace(&scene, &options, &rays[first], &hits[first], std::min(kPart, rays.size() - first), &sums[p],
               nullptr);
   });
-  for (const lsp_trace_counts& s : sums) {
-    counts->nodes += s.nodes;
-    counts->shafts += s.shafts;
-    counts->triangles += s.triangles;
-    counts->exact += s.exact;
-    counts->exact_nodes += s.exact_nodes;
-  }
+  for (const lsp_trace_counts& sum : sums) lsp_add_counts(counts, &sum);
   return hits;
 }
 

@@ -125,6 +125,9 @@ typedef struct lsp_trace_counts {
   uint64_t exact_nodes; /* cells: LspCellNode visited in these */
 } lsp_trace_counts;
 
+/* Adds `more` to *sum, field by field: of threads, or of parts of a set of rays. */
+void lsp_add_counts(lsp_trace_counts* sum, const lsp_trace_counts* more);
+
 /* Traces rays[0, count) into hits[0, count), in this thread, with some 20 KiB of its stack. Adds to *counts unless it
  * is NULL. Hand it many rays at once: approximate ones are traced in groups of 16, so that while one waits for memory
  * the others go on.
