@@ -163,7 +163,7 @@ void set_counts(Baked& baked) {
   if (steps > LSP_NONE)
     throw Failure(Exit::kLimit, "",
                   "the NTree needs " + with_commas(steps) +
-                      " steps of traversal, more than a file can state: lower --ntree-depth");
+                      " steps of traversal, more than a file can state: lower --levels");
   h.max_steps = uint32_t(steps);
 }
 

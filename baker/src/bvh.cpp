@@ -15,8 +15,6 @@ namespace {
 
 constexpr int kBins = 32;
 constexpr size_t kTaskReferences = 4096;  // smaller subtrees are built by one task
-// Below this depth the heuristic gives way to halving by count, so that the depth stays under LSP_MAX_STACK.
-constexpr uint32_t kMaxHeuristicDepth = LSP_MAX_STACK - 34;
 
 // Where this many nodes in a row found no spatial split worth its cost, those below are not asked any more:
 // in a heap of triangles that all overlap none ever is, and looking for one takes most of the time.
@@ -95,7 +93,7 @@ class Builder {
 
     std::vector<Reference> left, right;
     bool split = false;
-    if (depth < kMaxHeuristicDepth) {
+    if (depth < options_.heuristic_depth) {
       const ObjectSplit object = find_object_split(references);
       SpatialSplit spatial;
       const bool overlapping = spare > 0 && patience > 0 && !object.overlap.empty() &&

@@ -27,6 +27,8 @@ struct BvhOptions {
   // Spatial splits are tried where the children of the best object split overlap in a box with more than this
   // share of the root's area (Stich's alpha).
   double split_overlap = 1e-5;
+  // Below this depth nodes are halved by count, so that no tree is much deeper.
+  uint32_t heuristic_depth = LSP_MAX_STACK - 34;
 };
 
 // The tree in the file's form. `nodes` is in depth-first order, child 0 (of the larger area) before child 1;

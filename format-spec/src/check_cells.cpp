@@ -130,7 +130,8 @@ class CellCheck {
     return i + 1 < cells_.size() ? cells_[i + 1].*first : all;
   }
 
-  // Nodes in depth-first order, each named once, and no stack deeper than a traversal's.
+  // Nodes in depth-first order, each named once, and never more children waiting than a tree of the greatest
+  // depth has.
   void check_tree(uint64_t i) {
     const LspFilledCell& c = cells_[i];
     const uint64_t nodes = end(i, &LspFilledCell::node_first, header_.cell_node_count);
@@ -153,7 +154,7 @@ class CellCheck {
         good = child <= 0xFFFF &&
                (child & (LSP_CELL_MAX_REFERENCES - 1)) + count <= references - c.reference_first;
       } else {
-        good = child == next && c.node_first + next < nodes && stack.size() < kStack;
+        good = child == next && c.node_first + next < nodes && stack.size() < LSP_MAX_CELL_DEPTH;
         if (!good) break;
         const uint32_t children = nodes_[c.node_first + next++].children;
         stack.push_back(children >> 16);
@@ -222,8 +223,6 @@ class CellCheck {
              "its normal is not of unit length, or a number not finite");
     }
   }
-
-  static constexpr size_t kStack = 30;  // of lsp/cells.h, less its marks
 
   const FileView& view_;
   Report& report_;

@@ -20,10 +20,12 @@ extern "C" uint32_t lsp_dial(const lsp_scene* scene, const lsp_trace_options* op
   if (scene->cell_nodes == nullptr) return LSP_DIAL_TABLES;
   if ((options->flags & LSP_TRACE_MAX_LOSS) == 0)
     return scene->header->quality[options->quality < LSP_QUALITY_COUNT ? options->quality : LSP_QUALITY_BALANCED];
-  uint32_t classes = options->max_loss > 0 ? 1 : 0;
-  constexpr float kClasses[] = {1, 2, 5, 10, 20};  // per cent: what the first classes lose at most
-  for (const float limit : kClasses) classes += options->max_loss >= limit ? 1 : 0;
-  return options->max_loss >= 100 ? LSP_DIAL_TABLES : LSP_DIAL(classes, classes);
+  if (options->max_loss >= 100) return LSP_DIAL_TABLES;
+  if (!(options->max_loss > 0)) return LSP_DIAL(0u, 0u);
+  uint32_t classes = 0;
+  constexpr int kLimits[LSP_LOSS_UNKNOWN] = LSP_LOSS_LIMITS;
+  for (const int limit : kLimits) classes += options->max_loss >= static_cast<float>(limit) ? 1 : 0;
+  return LSP_DIAL(classes, classes);
 }
 
 extern "C" void lsp_add_counts(lsp_trace_counts* sum, const lsp_trace_counts* more) {

@@ -11,8 +11,10 @@
 
 #include "../baker/shapes.h"
 #include "bake.h"
+#include "cells/cell_grid.h"
 #include "lsp/lsp.h"
 #include "lsp/lsp_vulkan.h"
+#include "lsp/program.h"
 #include "lsp/scene_file.hpp"
 #include "lsp/vulkan_device.hpp"
 #include "rays.h"
@@ -188,6 +190,23 @@ TEST(Cells, SameTablesWithAnyNumberOfThreads) {
   EXPECT_EQ(single.cell_grid.words, many.cell_grid.words);
   EXPECT_EQ(single.cell_tables.plane_records, many.cell_tables.plane_records);
   EXPECT_EQ(std::memcmp(single.header.quality, many.header.quality, sizeof many.header.quality), 0);
+}
+
+// A tree of a cell names 8,191 triangles: with more the bake takes finer cells or says so.
+TEST(Cells, ACrowdedCellIsDividedOrRefused) {
+  Mesh mesh = sphere(72);  // 20,448 triangles
+  add_triangle(mesh, {200, 0, 0}, {200, 1, 0}, {200, 0, 1});
+  BakeOptions options = options_of_cells();
+  try {
+    bake(mesh, options);
+    FAIL() << "8 cells hold the sphere in one or two of them";
+  } catch (const Failure& f) {
+    EXPECT_EQ(f.exit(), Exit::kLimit);
+    EXPECT_NE(std::string(f.what()).find("--cells"), std::string::npos) << f.what();
+  }
+  options.cells = 0;
+  const lsp::Baked chosen = bake(mesh, options);
+  for (const Cell& cell : chosen.cell_grid.cells) EXPECT_LE(cell.count, kMostInCell);
 }
 
 class CellsOnVulkan : public testing::TestWithParam<uint32_t> {};

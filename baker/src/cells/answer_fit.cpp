@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lsp/layout.h"
+
 namespace lsp {
 namespace {
 
@@ -52,7 +54,7 @@ float AnswerFit::loss(std::span<const Plane> planes, const ShaftSample& s, uint3
   if (plane == kNoPlane) return hits ? 1.0f : 0.0f;
   const Plane& p = planes[plane];
   float t = (p.distance - glm::dot(p.normal, s.origin)) / glm::dot(p.normal, s.way);
-  const bool says = t > (near ? 0.0f : -kSlack) && t <= 1.0f + kSlack;
+  const bool says = t > (near ? 0.0f : -LSP_CELL_SLACK) && t <= 1.0f + LSP_CELL_SLACK;
   if (says != hits) return 1.0f;
   if (!says) return 0.0f;
   t = std::min(std::max(t, 0.0f), 1.0f);

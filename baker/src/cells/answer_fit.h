@@ -45,8 +45,6 @@ struct FitOptions {
 };
 
 constexpr int kSplitWeight = 31;
-// How far outside its passage a plane hit may lie, as a share of the passage; the same in lsp/cells.h.
-constexpr float kSlack = 0.05f;
 
 // Chooses for `samples`, every fourth of which (of 24 and more) only measures. `near` where rays begin in the
 // cell: then nothing behind the origin counts.

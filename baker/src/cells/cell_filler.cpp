@@ -1,6 +1,7 @@
 #include "cell_filler.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <map>
 
@@ -114,6 +115,7 @@ class Filler {
     }
     BvhOptions options;
     options.spatial_splits = false;
+    options.heuristic_depth = LSP_MAX_CELL_DEPTH - uint32_t(std::bit_width(LSP_CELL_MAX_REFERENCES));
     tree_ = build_bvh(mesh, options);
     out_.tree = compact(tree_, lo_ - scene_.grid.margin, size_ + 2 * scene_.grid.margin);
     for (uint32_t& r : out_.tree.references) r = records_[r];

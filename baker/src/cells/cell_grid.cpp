@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 #include "conservative.h"
+#include "lsp/program.h"
 
 namespace lsp {
 namespace {
@@ -73,9 +75,7 @@ void add_jumps(CellGrid& grid) {
   }
 }
 
-}  // namespace
-
-CellGrid build_cell_grid(std::span<const LspTriangle> triangles, const Box& bounds, uint32_t longest) {
+CellGrid sort_into_cells(std::span<const LspTriangle> triangles, const Box& bounds, uint32_t longest) {
   CellGrid grid;
   const glm::vec3 extent = bounds.extent();
   const float side = std::max({extent.x, extent.y, extent.z});
@@ -133,20 +133,45 @@ CellGrid build_cell_grid(std::span<const LspTriangle> triangles, const Box& boun
   return grid;
 }
 
+size_t fullest(const CellGrid& grid) {
+  size_t most = 0;
+  for (const Cell& cell : grid.cells) most = std::max<size_t>(most, cell.count);
+  return most;
+}
+
+CellGrid refuse_crowded(CellGrid grid) {
+  const size_t most = fullest(grid);
+  if (most > kMostInCell)
+    throw Failure(Exit::kLimit, "",
+                  "a cell would hold " + std::to_string(most) + " triangles, and it can hold " +
+                      std::to_string(kMostInCell) + ": give more --cells, or --base bvh");
+  return grid;
+}
+
+}  // namespace
+
+CellGrid build_cell_grid(std::span<const LspTriangle> triangles, const Box& bounds, uint32_t longest) {
+  return refuse_crowded(sort_into_cells(triangles, bounds, longest));
+}
+
 CellGrid choose_cell_grid(std::span<const LspTriangle> triangles, const Box& bounds) {
   // Filled cells grow with the square of the cells on the longest side, or a little faster.
   const size_t wanted = std::clamp(triangles.size() / kTrianglesPerCell, size_t(8), kWantedCells);
   uint32_t longest = 8;
-  CellGrid grid = build_cell_grid(triangles, bounds, longest);
+  CellGrid grid = sort_into_cells(triangles, bounds, longest);
   for (int attempt = 0; attempt < 4; ++attempt) {
     const double more = double(wanted) / double(std::max<size_t>(1, grid.cells.size()));
     if (more > 0.8 && more < 1.25) break;
     const auto next = uint32_t(std::clamp(std::lround(longest * std::sqrt(more)), 2l, long(kMostLongest)));
     if (next == longest) break;
     longest = next;
-    grid = build_cell_grid(triangles, bounds, longest);
+    grid = sort_into_cells(triangles, bounds, longest);
   }
-  return grid;
+  while (longest < uint32_t(LSP_MAX_CELLS) && fullest(grid) > kMostInCell) {
+    longest = std::min(longest * 3 / 2, uint32_t(LSP_MAX_CELLS));
+    grid = sort_into_cells(triangles, bounds, longest);
+  }
+  return refuse_crowded(std::move(grid));
 }
 
 }  // namespace lsp

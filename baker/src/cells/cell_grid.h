@@ -36,12 +36,17 @@ struct CellGrid {
   glm::vec3 corner(const glm::ivec3& c) const { return lo + glm::vec3(c) * size; }
 };
 
+// As many triangles as the tree of a cell can name: the last reference is not among them, for a leaf of four
+// there is LSP_CELL_NO_CHILD.
+constexpr size_t kMostInCell = LSP_CELL_MAX_REFERENCES - 1;
+
 // `longest` cells lie along the longest side of `bounds`, which holds all triangles. Runs on all threads of
-// the current oneTBB arena; the result does not depend on their number.
+// the current oneTBB arena; the result does not depend on their number. Throws Failure with Exit::kLimit where
+// a cell holds more than kMostInCell triangles.
 CellGrid build_cell_grid(std::span<const LspTriangle> triangles, const Box& bounds, uint32_t longest);
 
 // With as many cells as the scene wants: about kWantedCells of them filled, or as many as it has triangles
-// for.
+// for, and more where a cell would be too full. Throws as above where the most cells do not help.
 CellGrid choose_cell_grid(std::span<const LspTriangle> triangles, const Box& bounds);
 
 }  // namespace lsp

@@ -51,9 +51,9 @@ void set_cells(const CellGrid& grid, const CellTables& tables, const CellTableOp
 }
 
 uint32_t loss_class(float loss) {
-  constexpr float kLimits[LSP_LOSS_UNKNOWN] = {0, 0.01f, 0.02f, 0.05f, 0.1f, 0.2f, 1};
+  constexpr int kLimits[LSP_LOSS_UNKNOWN] = LSP_LOSS_LIMITS;
   uint32_t c = 0;
-  while (c + 1 < LSP_LOSS_UNKNOWN && loss > kLimits[c]) ++c;
+  while (c + 1 < LSP_LOSS_UNKNOWN && loss > float(kLimits[c]) / 100) ++c;
   return c;
 }
 

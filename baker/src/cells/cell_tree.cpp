@@ -26,8 +26,6 @@ uint32_t child_of(uint32_t ref) {
 CellTree compact(const Bvh& bvh, const glm::vec3& lo, float size) {
   CellTree tree;
   tree.references = bvh.records;
-  // The leaf that is LSP_CELL_NO_CHILD must not be named either.
-  if (bvh.records.size() >= LSP_CELL_MAX_REFERENCES || bvh.nodes.size() >= LSP_CELL_LEAF_BIT) return tree;
   tree.root = child_of(bvh.root);
   const double step = double(size) / 255;
   for (const LspNode& n : bvh.nodes) {

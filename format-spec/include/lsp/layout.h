@@ -280,8 +280,12 @@ LSP_END(LspFilledCell)
 #define LSP_ANSWER_EMPTY 0x1FFFu /* nothing in the cell */
 #define LSP_ANSWER_SKY 0x1FFEu   /* nothing on the whole ray; of origin tables */
 #define LSP_LOSS_SHIFT 13u
-/* Classes of loss: 0: none was seen; then up to 1, 2, 5, 10, 20, 100 per cent. */
+/* Classes of loss and what they lose at most, per cent; 0: none was seen. */
+#define LSP_LOSS_LIMITS {0, 1, 2, 5, 10, 20, 100}
 #define LSP_LOSS_UNKNOWN 7u /* too few rays came that way to know */
+
+/* How far outside its passage of the cell a ray may meet the plane that answers it, as a share of the passage. */
+#define LSP_CELL_SLACK 0.05f
 
 /* The plane of triangles of a cell. */
 LSP_BEGIN(LspPlane)
@@ -313,6 +317,7 @@ LSP_END(LspCellNode)
 #define LSP_CELL_LEAF_COUNT_SHIFT 13u
 #define LSP_CELL_MAX_REFERENCES 0x2000u
 #define LSP_CELL_NO_CHILD 0xFFFFu
+#define LSP_MAX_CELL_DEPTH 30u /* edges from the root of a cell's tree to its deepest leaf */
 
 LSP_BEGIN(LspTriangle)
   LSP_VEC3 v0;

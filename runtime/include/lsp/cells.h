@@ -15,9 +15,8 @@
  * edges or more, and an exact trace reaches as far beyond the cell's ends. So no triangle is lost between cells.
  */
 
-/* How far outside its passage a plane hit may lie, as a share of the passage; as in the bake. */
-#define LSP_CELL_SLACK 0.05f
-#define LSP_CELL_STACK 32u
+/* A mark, a child for every level of a cell's tree, and room behind. */
+#define LSP_CELL_STACK (LSP_MAX_CELL_DEPTH + 2u)
 
 /* Children of nodes that are yet to be visited, from entry 1 on. Entry 0 is LSP_NONE once all work is done: a device
  * may end loops early, and then only memory tells, see lsp/bvh.h. */
