@@ -27,7 +27,7 @@ struct Options {
   std::string device;
   bool skip_empty = false;
   float lod = 0;
-  std::string quality = "balanced";
+  std::string quality;  // empty: balanced
   float max_loss = -1;  // negative: the quality's
   uint32_t repeats = 1;
   uint32_t threads = std::max(1u, std::thread::hardware_concurrency());
@@ -53,7 +53,7 @@ void define(CLI::App& app, Options& options) {
          "--lod", options.lod,
          "Stop at a Line Space once its diagonal is under THETA times the distance; 0: only at the deepest")
       ->check(CLI::Range(0.0f, 1e6f));
-  app.add_option("--quality", options.quality, "Cells: a point of the dial that the bake measured and the file states")
+  app.add_option("--quality", options.quality, "Cells: a point of the dial that the bake measured and the file states; without it balanced")
       ->check(CLI::IsMember({"fast", "balanced", "accurate"}));
   app.add_option("--max-loss", options.max_loss,
                  "Cells: trace exactly where entries lose more, in per cent; 100: tables alone, 0: every cell exactly; without it "
@@ -138,7 +138,7 @@ nlohmann::ordered_json to_json(const Options& options, const TraceRequest& reque
   json["bytes_uploaded"] = report.bytes_uploaded;
   json["retraced"] = report.retraced;
   if ((file.scene().header->required_features & LSP_FEATURE_CELLS) != 0) {
-    json["quality"] = options.quality;
+    json["quality"] = options.quality.empty() ? "balanced" : options.quality;
     if (options.max_loss >= 0) json["max_loss"] = options.max_loss;
     json["steps_per_ray"] = per(static_cast<double>(counts.nodes), counts.rays);
     json["lookups_per_ray"] = per(static_cast<double>(counts.shafts), counts.rays);
@@ -180,8 +180,24 @@ uint64_t physical_memory() {
   return pages > 0 && page > 0 ? static_cast<uint64_t>(pages) * static_cast<uint64_t>(page) : UINT64_MAX;
 }
 
+// Options that this file gives no meaning: said, not ignored in silence.
+void note_unused(const Options& options, const LspHeader& header) {
+  const bool cells = (header.required_features & LSP_FEATURE_CELLS) != 0;
+  const auto note = [&](bool given, const char* option, const char* why) {
+    if (given) std::cerr << "lsp-trace: " << options.file << ": " << option << " does nothing: " << why << "\n";
+  };
+  const char* const dial = "the file has no cells";
+  note(!cells && !options.quality.empty(), "--quality", dial);
+  note(!cells && options.max_loss >= 0, "--max-loss", dial);
+  const char* const tree = "the file has cells, see --quality";
+  note(cells && options.lod > 0, "--lod", tree);
+  note(cells && options.near != "exact", "--near", tree);
+  note(cells && options.skip_empty, "--skip-empty", tree);
+}
+
 Exit run(const Options& options) {
   const SceneFile file(options.file, physical_memory());
+  if (!options.common.quiet) note_unused(options, file.header());
   const std::vector<LspRay> rays = read_rays(options.rays);
   std::vector<LspHit> hits(rays.size());
   const TraceRequest request = make_request(options, file.header());

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <map>
 #include <memory>
+#include <tuple>
 
 #include "device.h"
 #include "scene_buffers.h"
@@ -177,13 +178,15 @@ class Pipelines {
   }
   Pipelines(const Pipelines&) = delete;
   Pipelines& operator=(const Pipelines&) = delete;
-  VkPipeline get(bool counting, uint32_t flags) {
-    VkPipeline& pipeline = made_[{counting, flags}];
+  // `tables`: of cells the tables alone answer.
+  VkPipeline get(bool counting, uint32_t flags, bool tables) {
+    VkPipeline& pipeline = made_[{counting, flags, tables}];
     if (pipeline != VK_NULL_HANDLE) return pipeline;
     lsp_vulkan_plan plan = plan_;
     if (plan.base_structure == LSP_BASE_CELLS && (flags & LSP_TRACE_APPROXIMATE) == 0)
       plan.base_structure = LSP_BASE_BVH;
-    return pipeline = shader_.create_pipeline(plan, counting, flags, stack_, parts_);
+    return pipeline = shader_.create_pipeline(plan, counting, flags, stack_,
+                                              tables ? parts_ & ~LSP_PART_CELL_EXACT : parts_);
   }
 
  private:
@@ -192,7 +195,7 @@ class Pipelines {
   lsp_vulkan_plan plan_;
   uint32_t stack_;
   uint32_t parts_;
-  std::map<std::pair<bool, uint32_t>, VkPipeline> made_;
+  std::map<std::tuple<bool, uint32_t, bool>, VkPipeline> made_;
 };
 
 // Rays and hits of one batch. Where device and host share memory the shader works on what the host writes; on
@@ -267,7 +270,7 @@ class VulkanTracer::Impl {
   VulkanOptions options_;
   lsp_scene scene_{};
   uint32_t uses_ = 0;
-  uint32_t dial_ = 0;  // of the trace in progress
+  uint32_t dial_ = 0;  // of the trace in progress; 0: it has none
   std::unique_ptr<Shader> shader_;
   std::unique_ptr<Pipelines> pipelines_;
   Buffer counters_;
@@ -365,7 +368,7 @@ void VulkanTracer::Impl::record_batch(const lsp_trace_options& options, uint32_t
     vk.vkCmdWriteTimestamp(commands, kCompute, shader_->timer, 0);
   }
   const lsp_vulkan_trace_constants constants{options.lod, 0, count, dial_};
-  lsp_vulkan_record_trace(&device->functions, commands, pipelines_->get(counting, options.flags),
+  lsp_vulkan_record_trace(&device->functions, commands, pipelines_->get(counting, options.flags, dial_ == LSP_DIAL_TABLES),
                           shader_->layout, shader_->set, &constants);
   if (shader_->timer != VK_NULL_HANDLE) vk.vkCmdWriteTimestamp(commands, kCompute, shader_->timer, 1);
   if (batch_.staged()) {
@@ -418,9 +421,10 @@ VulkanTrace VulkanTracer::Impl::trace(const lsp_trace_options& wanted, std::span
   constexpr uint32_t kConservative = LSP_FEATURE_LINE_SPACES | LSP_FEATURE_BINARY;  // what such a file has
   if (scene_.header == nullptr || (scene_.header->required_features & kConservative) != kConservative)
     options.flags &= ~LSP_TRACE_SKIP_EMPTY;
+  dial_ = 0;
   if (scene_.header != nullptr && (scene_.header->required_features & LSP_FEATURE_CELLS) != 0) {
     options.flags &= LSP_TRACE_APPROXIMATE | LSP_TRACE_ANY_HIT;
-    dial_ = lsp_dial(&scene_, &wanted);
+    if ((options.flags & LSP_TRACE_APPROXIMATE) != 0) dial_ = lsp_dial(&scene_, &wanted);
   }
   uint32_t needed = (options.flags & LSP_TRACE_APPROXIMATE) != 0 ? LSP_USE_APPROXIMATE : LSP_USE_EXACT;
   if ((options.flags & LSP_TRACE_SKIP_EMPTY) != 0) needed |= LSP_USE_APPROXIMATE;

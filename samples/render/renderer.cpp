@@ -82,9 +82,6 @@ class Renderer {
         arena_(options.threads > 0 ? options.threads : tbb::task_arena::automatic),
         offset_(3e-5f * scene.diagonal()),
         picture_(options.width, options.height) {
-    indirect_flags_ = options.approximate ? LSP_TRACE_APPROXIMATE : 0u;
-    if (options.approximate && options.near_approximate) indirect_flags_ |= LSP_TRACE_NEAR_APPROXIMATE;
-    if (options.approximate && options.near_skip) indirect_flags_ |= LSP_TRACE_NEAR_SKIP;
     const size_t pixels = picture_.pixels.size();
     for (size_t c = 0; c < kComponents; ++c) {
       sum_[c] = Picture(options.width, options.height);
@@ -280,7 +277,7 @@ class Renderer {
       rays_[i] = ray_from(s.point, above(s.point, direction), reach);
       light_[i] = {s.item, kSmooth, glm::vec3(1.0f)};
     });
-    trace_light(indirect_flags_, true);
+    trace_light(options_.indirect, true);
   }
 
   // Light from sky, sun and emitters at the surfaces the eye sees.
@@ -292,7 +289,7 @@ class Renderer {
                       kSmooth, kSharp);
     });
     end_light();
-    trace_light(0, false);
+    trace_light({}, false);
     for (const Surface& s : surfaces_) add(s.item, kSharp, s.point.emission);
   }
 
@@ -367,7 +364,7 @@ class Renderer {
   void follow_paths(int bounce) {
     path_hits_.resize(path_rays_.size());
     report_.indirect_rays += path_rays_.size();
-    report_.indirect_seconds += tracer_.trace({indirect_flags_, options_.lod}, path_rays_, path_hits_);
+    report_.indirect_seconds += tracer_.trace(options_.indirect, path_rays_, path_hits_);
 
     // Paths that met a surface go on; the others end in the sky.
     points_.resize(paths_.size());
@@ -404,7 +401,7 @@ class Renderer {
                       component);
     });
     end_light();
-    trace_light(indirect_flags_, true);
+    trace_light(options_.indirect, true);
 
     if (bounce + 1 == options_.bounces) return;
     path_rays_.resize(kept);
@@ -534,10 +531,10 @@ class Renderer {
     ray = {from_glm(origin), 0.0f, from_glm(chosen_way), 0.999f};
   }
 
-  void trace_light(uint32_t flags, bool indirect) {
+  void trace_light(lsp_trace_options options, bool indirect) {
     hits_.resize(rays_.size());
-    const double seconds =
-        tracer_.trace({flags | LSP_TRACE_ANY_HIT, indirect ? options_.lod : 0.0f}, rays_, hits_);
+    options.flags |= LSP_TRACE_ANY_HIT;
+    const double seconds = tracer_.trace(options, rays_, hits_);
     (indirect ? report_.indirect_rays : report_.shadow_rays) += rays_.size();
     (indirect ? report_.indirect_seconds : report_.shadow_seconds) += seconds;
     for (size_t i = 0; i < light_.size(); ++i) {
@@ -553,7 +550,6 @@ class Renderer {
   RenderReport& report_;
   tbb::task_arena arena_;
   float offset_;  // rays start this far off their surface
-  uint32_t indirect_flags_ = 0;
   Picture picture_;
   std::vector<uint32_t> order_;
 

@@ -20,10 +20,7 @@ enum class Effect { kDirect, kAmbientOcclusion, kDiffuse, kGlossy, kAll };
 
 struct RenderOptions {
   Effect effect = Effect::kAll;
-  bool approximate = false;       // what indirect rays are traced with
-  bool near_approximate = false;  // with approximate: nothing exact near a ray's origin
-  bool near_skip = false;         // with approximate: exact there only where something is ahead
-  float lod = 0.0f;               // theta
+  lsp_trace_options indirect{};  // what indirect rays are traced with
   int width = 960;
   int height = 540;
   uint32_t samples = 16;

@@ -249,7 +249,7 @@ LSP_STEP void lsp_advance(LspScene scene, LspSetup s, LspQuery q) {
       uint entry = LSP_ANSWER_EMPTY | (begins ? LSP_LOSS_UNKNOWN << LSP_LOSS_SHIFT : 0u);
       if (look.entry != LSP_NONE) entry = lsp_load_entry(scene, look.entry);
       uint answer = entry & LSP_ANSWER_MASK;
-      if ((entry >> LSP_LOSS_SHIFT) >= (begins ? q.dial & 0xFFu : q.dial >> 8u)) {
+      if ((LSP_PARTS & LSP_PART_CELL_EXACT) != 0u && (entry >> LSP_LOSS_SHIFT) >= (begins ? q.dial & 0xFFu : q.dial >> 8u)) {
         exact = index;
         lsp_walk.exact_cell = cell;
         lsp_walk.exact_t = t;
@@ -301,6 +301,7 @@ LSP_FN float lsp_byte(uint word, uint shift) { return float((word >> shift) & 0x
 
 /* Traces the cell of lsp_walk.ref exactly: its closest triangle, or any, between where the ray entered it and left it. */
 LSP_STEP void lsp_test_leaf(LspScene scene, LspSetup s) {
+  if ((LSP_PARTS & LSP_PART_CELL_EXACT) == 0u) return;
   LspCellGrid grid = lsp_load_header(scene).cells;
   LspFilledCell tree = lsp_load_cell_tree(scene, lsp_walk.ref & ~LSP_LEAF_BIT);
   precise float reach = grid.margin / s.speed; /* along no axis more than the margin */

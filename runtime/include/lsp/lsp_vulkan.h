@@ -144,7 +144,8 @@ void lsp_vulkan_record_upload_barrier(const lsp_vulkan_functions* functions, VkC
  */
 
 /* The parts of the shader that a scene needs: LSP_PART_* of lsp/parts.h. The rest costs time where it is not
- * compiled away; with a part missing that a scene needs its answers are wrong. */
+ * compiled away; with a part missing that a scene needs its answers are wrong. Cells: a pipeline for the dial
+ * LSP_DIAL_TABLES alone does without LSP_PART_CELL_EXACT. */
 uint32_t lsp_vulkan_parts(const lsp_scene* scene);
 
 /* SPIR-V (for Vulkan 1.1) of the trace shader for scenes planned like `plan` (of cells: for approximate rays; for exact
