@@ -63,8 +63,12 @@ struct Arguments {
 struct Quality {
   uint32_t resolution, depth, samples;
 };
-const std::map<std::string, Quality> kPresets = {
-    {"fast", {4, 8, 3}}, {"balanced", {6, 9, 5}}, {"accurate", {6, 11, 9}}};
+struct Preset {
+  Quality line_spaces;
+  uint32_t far_samples, origin_samples;  // of cells
+};
+const std::map<std::string, Preset> kPresets = {
+    {"fast", {{4, 8, 3}, 24, 8}}, {"balanced", {{6, 9, 5}, 64, 32}}, {"accurate", {{6, 11, 9}, 128, 96}}};
 // From cheap to dear, for --max-error.
 const std::vector<Quality> kLadder = {{4, 7, 5}, {4, 9, 5}, {6, 9, 5}, {6, 11, 9}, {8, 11, 9}, {8, 13, 9}};
 constexpr uint64_t kErrorRays = 65536;
@@ -199,7 +203,8 @@ Exit run(Arguments a) {
     throw Failure(Exit::kUsage, "", "--max-error needs Line Spaces with candidates");
   if ((a.conservative || a.directed) && (a.purpose != Purpose::kVisibility || a.no_line_spaces))
     throw Failure(Exit::kUsage, "", "--conservative and --directed need the Line Spaces of --for visibility");
-  const Quality& preset = kPresets.at(a.preset);
+  const Preset& chosen = kPresets.at(a.preset);
+  const Quality& preset = chosen.line_spaces;
   const bool ntree = a.base == "ntree";
   if (!ntree && (a.branching || a.levels != kNTreeLevels))
     throw Failure(Exit::kUsage, "", "--branching and --levels need --base ntree");
@@ -249,6 +254,8 @@ Exit run(Arguments a) {
   options.line_spaces = !a.no_line_spaces;
   options.base = ntree ? Base::kNTree : cells ? Base::kCells : Base::kBvh;
   options.cells = a.cells;
+  options.cell_tables.far_samples = chosen.far_samples;
+  options.cell_tables.origin_samples = chosen.origin_samples;
   options.ntree.branching = a.branching;
   options.ntree.levels = a.levels;
   options.bvh.spatial_splits = !a.no_splits;
@@ -394,7 +401,8 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember({0}) | CLI::Range(2u, LSP_MAX_BRANCHING));
   app.add_option("--levels", a.levels, "NTree: levels of nodes")->check(CLI::Range(1u, LSP_MAX_NTREE_DEPTH));
   app.add_option("--preset", a.preset,
-                 "Speed against accuracy, where --resolution, --depth or --samples do not say")
+                 "Speed against accuracy, where --resolution, --depth or --samples do not say; of cells: the time of "
+                 "the bake against the exact work that their qualities need")
       ->check(CLI::IsMember({"fast", "balanced", "accurate"}));
   app.add_option("--max-error", a.max_error,
                  "Choose the cheapest setting with at most this many per cent of rays answered wrongly")

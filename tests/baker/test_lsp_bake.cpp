@@ -63,6 +63,16 @@ TEST_F(LspBake, GivesTheSameBytesOnAnyNumberOfThreads) {
   EXPECT_TRUE(read("a.lsp") == read("b.lsp"));
 }
 
+TEST_F(LspBake, PresetsOfCellsDiffer) {
+  write_grid("small.obj", 12);
+  for (const std::string preset : {"fast", "balanced", "accurate"})
+    ASSERT_EQ(run("small.obj --base cells --preset " + preset + " -o " + preset + ".lsp"), 0);
+  EXPECT_FALSE(read("fast.lsp") == read("balanced.lsp"));
+  EXPECT_FALSE(read("balanced.lsp") == read("accurate.lsp"));
+  ASSERT_EQ(run("small.obj --base cells -o default.lsp"), 0);
+  EXPECT_TRUE(read("default.lsp") == read("balanced.lsp"));
+}
+
 TEST_F(LspBake, PrintsOneJsonObject) {
   ASSERT_EQ(run("grid.obj -o a.lsp --depth 5 --json"), 0);
   const auto report = nlohmann::json::parse(read("out"));

@@ -168,7 +168,7 @@ CellGrid choose_cell_grid(std::span<const LspTriangle> triangles, const Box& bou
     grid = sort_into_cells(triangles, bounds, longest);
   }
   while (longest < uint32_t(LSP_MAX_CELLS) && fullest(grid) > kMostInCell) {
-    longest = std::min(longest + longest / 8 + 1, uint32_t(LSP_MAX_CELLS));
+    longest = std::min(longest + longest / 16 + 1, uint32_t(LSP_MAX_CELLS));
     grid = sort_into_cells(triangles, bounds, longest);
   }
   return refuse_crowded(std::move(grid));
