@@ -254,8 +254,9 @@ void keep_tables_only(Baked& baked) {
     }
     record = number[record];
   }
-  baked.skipped.push_back("triangles that no plane is of: " + with_commas(baked.triangles.size() - triangles.size()) +
-                          " of " + with_commas(baked.triangles.size()));
+  baked.skipped.push_back(
+      "triangles that no plane is of: " + with_commas(baked.triangles.size() - triangles.size()) + " of " +
+      with_commas(baked.triangles.size()));
   baked.triangles = std::move(triangles);
   baked.normals = std::move(normals);
   baked.nodes.clear();

@@ -166,7 +166,10 @@ Json provenance(const Arguments& a, const Baked& baked, const Mesh& mesh,
           {"source_hash", hex128(source[0], source[1])},
           {"options",
            {{"base", a.base},
-            {"cells", baked.header.cells.cells_x ? std::max({baked.header.cells.cells_x, baked.header.cells.cells_y, baked.header.cells.cells_z}) : 0},
+            {"cells", baked.header.cells.cells_x
+                          ? std::max({baked.header.cells.cells_x, baked.header.cells.cells_y,
+                                      baked.header.cells.cells_z})
+                          : 0},
             {"branching", a.branching},
             {"levels", a.base == "ntree" ? a.levels : 0},
             {"resolution", a.resolution},
@@ -210,10 +213,12 @@ Exit run(Arguments a) {
     throw Failure(Exit::kUsage, "", "--branching and --levels need --base ntree");
   const bool cells = a.base == "cells";
   if (a.cells && !cells) throw Failure(Exit::kUsage, "", "--cells needs --base cells");
-  if (cells && (a.resolution_given || a.depth_given || a.samples_given || a.no_line_spaces || a.max_error > 0))
-    throw Failure(Exit::kUsage, "",
-                  "--base cells has its own tables: leave out --resolution, --depth, --samples, --max-error and "
-                  "--no-line-spaces");
+  if (cells &&
+      (a.resolution_given || a.depth_given || a.samples_given || a.no_line_spaces || a.max_error > 0))
+    throw Failure(
+        Exit::kUsage, "",
+        "--base cells has its own tables: leave out --resolution, --depth, --samples, --max-error and "
+        "--no-line-spaces");
   if (cells && a.purpose == Purpose::kVisibility)
     throw Failure(Exit::kUsage, "", "--for visibility needs Line Spaces: leave out --base cells");
   if (ntree && a.max_error > 0)
@@ -361,8 +366,9 @@ Exit run(Arguments a) {
     std::printf("tree        %u nodes, %u triangle records, depth %u\n", baked.header.node_count,
                 baked.header.triangle_count, baked.header.max_depth);
     if (const LspCellGrid& g = baked.header.cells; cells)
-      std::printf("cells       %u x %u x %u, %u filled; %u splits, %u planes\n", g.cells_x, g.cells_y, g.cells_z,
-                  baked.header.filled_cell_count, baked.header.split_count, baked.header.plane_count);
+      std::printf("cells       %u x %u x %u, %u filled; %u splits, %u planes\n", g.cells_x, g.cells_y,
+                  g.cells_z, baked.header.filled_cell_count, baked.header.split_count,
+                  baked.header.plane_count);
     if (baked.header.line_space_count)
       std::printf("Line Spaces %u, %.1f %% of the shafts filled\n", baked.header.line_space_count,
                   100.0 * double(ls.filled) / double(std::max<uint64_t>(1, ls.shafts)));
@@ -395,14 +401,16 @@ int main(int argc, char** argv) {
   app.add_option("INPUT", a.inputs, "Mesh files, read in this order")->required();
   app.add_option("-o,--output", a.output, "The .lsp file to write")->required();
   app.add_option("--base", a.base, "Base structure")->check(CLI::IsMember({"bvh", "ntree", "cells"}));
-  app.add_option("--cells", a.cells, "Cells along the longest side of the grid of --base cells; 0: chosen from the scene")
+  app.add_option("--cells", a.cells,
+                 "Cells along the longest side of the grid of --base cells; 0: chosen from the scene")
       ->check(CLI::Range(0u, LSP_MAX_CELLS));
   app.add_option("--branching", a.branching, "NTree: cells along an edge of a node; 0: as --resolution")
       ->check(CLI::IsMember({0}) | CLI::Range(2u, LSP_MAX_BRANCHING));
   app.add_option("--levels", a.levels, "NTree: levels of nodes")->check(CLI::Range(1u, LSP_MAX_NTREE_DEPTH));
-  app.add_option("--preset", a.preset,
-                 "Speed against accuracy, where --resolution, --depth or --samples do not say; of cells: the time of "
-                 "the bake against the exact work that their qualities need")
+  app.add_option(
+         "--preset", a.preset,
+         "Speed against accuracy, where --resolution, --depth or --samples do not say; of cells: the time of "
+         "the bake against the exact work that their qualities need")
       ->check(CLI::IsMember({"fast", "balanced", "accurate"}));
   app.add_option("--max-error", a.max_error,
                  "Choose the cheapest setting with at most this many per cent of rays answered wrongly")

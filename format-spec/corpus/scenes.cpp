@@ -259,7 +259,8 @@ std::vector<ValidFile> valid_files() {
   add("packed-4096", "packed, the raw form aligned to 4096", packed(with_alignment(full_scene(), 4096)));
   add("newer-minor", "a later minor version with an unknown optional feature and section", newer_minor());
   add("cells", "cells beside a BVH", encode(full_cells_scene()));
-  add("cells-tables", "cells alone: tables and the triangles of their planes", encode(full_cells_scene(false)));
+  add("cells-tables", "cells alone: tables and the triangles of their planes",
+      encode(full_cells_scene(false)));
   return files;
 }
 

@@ -110,10 +110,11 @@ void check_grid(const LspHeader& header, Report& report) {
   const auto near = [](double x, double y) { return std::fabs(x - y) <= 1e-6 * std::fabs(y); };
   bool good = std::memcmp(&g, &kNone, sizeof g) == 0;
   if (has_cells(header))
-    good = cells_readable(header) && finite(g.lo) && positive(g.size) && positive(g.per_size) && positive(g.margin) &&
-           positive(g.box_step) && near(double(g.per_size) * g.size, 1) &&
+    good = cells_readable(header) && finite(g.lo) && positive(g.size) && positive(g.per_size) &&
+           positive(g.margin) && positive(g.box_step) && near(double(g.per_size) * g.size, 1) &&
            near(255.0 * g.box_step, g.size + 2.0 * g.margin);
-  if (!good) LSP_HEADER_FINDING(kCellsGrid, cells, "the grid of cells is out of range, or there where there is none");
+  if (!good)
+    LSP_HEADER_FINDING(kCellsGrid, cells, "the grid of cells is out of range, or there where there is none");
   const double origin[] = {std::bit_cast<double>(header.origin_x), std::bit_cast<double>(header.origin_y),
                            std::bit_cast<double>(header.origin_z)};
   for (double x : origin)
@@ -122,7 +123,8 @@ void check_grid(const LspHeader& header, Report& report) {
       break;
     }
   for (uint32_t dial : header.quality)
-    if ((dial & 0xFF) > LSP_LOSS_UNKNOWN + 1 || dial >> 8 > LSP_LOSS_UNKNOWN + 1 || (dial != 0 && !has_cells(header))) {
+    if ((dial & 0xFF) > LSP_LOSS_UNKNOWN + 1 || dial >> 8 > LSP_LOSS_UNKNOWN + 1 ||
+        (dial != 0 && !has_cells(header))) {
       LSP_HEADER_FINDING(kQualityRange, quality, "is " + hex(dial));
       break;
     }
@@ -132,8 +134,9 @@ void check_base(const LspHeader& header, Report& report) {
   const bool ntree = header.base_structure == LSP_BASE_NTREE;
   const bool cells = has_cells(header);
   const uint32_t features = header.required_features & (LSP_FEATURE_NTREE | LSP_FEATURE_CELLS);
-  if ((header.base_structure != LSP_BASE_BVH && !ntree && !cells) ||
-      features != (ntree ? LSP_FEATURE_NTREE : cells ? LSP_FEATURE_CELLS : 0))
+  if ((header.base_structure != LSP_BASE_BVH && !ntree && !cells) || features != (ntree   ? LSP_FEATURE_NTREE
+                                                                                  : cells ? LSP_FEATURE_CELLS
+                                                                                          : 0))
     LSP_HEADER_FINDING(kBaseStructure, base_structure,
                        "is " + std::to_string(header.base_structure) + " with the feature bits NTREE " +
                            (features & LSP_FEATURE_NTREE ? "set" : "clear") + " and CELLS " +

@@ -170,9 +170,9 @@ struct Fields<LspBitWord> {
 template <>
 struct Fields<LspFilledCell> {
   using Owner = LspFilledCell;
-  static constexpr Field list[] = {LSP_FIELD(sub_mask_lo), LSP_FIELD(sub_mask_hi), LSP_FIELD(sub_first),
-                                   LSP_FIELD(reserved),    LSP_FIELD(plane_first), LSP_FIELD(plane_count),
-                                   LSP_FIELD(split_first), LSP_FIELD(split_count), LSP_FIELD(root),
+  static constexpr Field list[] = {LSP_FIELD(sub_mask_lo), LSP_FIELD(sub_mask_hi),     LSP_FIELD(sub_first),
+                                   LSP_FIELD(reserved),    LSP_FIELD(plane_first),     LSP_FIELD(plane_count),
+                                   LSP_FIELD(split_first), LSP_FIELD(split_count),     LSP_FIELD(root),
                                    LSP_FIELD(node_first),  LSP_FIELD(reference_first), LSP_FIELD(max_steps)};
 };
 
@@ -210,17 +210,17 @@ constexpr bool complete() {
 }
 static_assert(complete<LspHeader>() && complete<LspSection>() && complete<LspNode>() && complete<LspCell>() &&
               complete<LspTriangle>() && complete<LspCornerNormals>() && complete<LspMaterial>() &&
-              complete<LspLineSpace>() && complete<LspBitWord>() && complete<LspFilledCell>() && complete<LspPlane>() &&
-              complete<LspSplit>() && complete<LspCellNode>());
+              complete<LspLineSpace>() && complete<LspBitWord>() && complete<LspFilledCell>() &&
+              complete<LspPlane>() && complete<LspSplit>() && complete<LspCellNode>());
 
 constexpr Struct kStructs[] = {
     describe<LspHeader>("LspHeader"),     describe<LspSection>("LspSection"),
     describe<LspNode>("LspNode"),         describe<LspCell>("LspCell"),
     describe<LspTriangle>("LspTriangle"), describe<LspCornerNormals>("LspCornerNormals"),
     describe<LspMaterial>("LspMaterial"), describe<LspLineSpace>("LspLineSpace"),
-    describe<LspBitWord>("LspBitWord"),
-    describe<LspFilledCell>("LspFilledCell"), describe<LspPlane>("LspPlane"),
-    describe<LspSplit>("LspSplit"),       describe<LspCellNode>("LspCellNode"),
+    describe<LspBitWord>("LspBitWord"),   describe<LspFilledCell>("LspFilledCell"),
+    describe<LspPlane>("LspPlane"),       describe<LspSplit>("LspSplit"),
+    describe<LspCellNode>("LspCellNode"),
 };
 
 template <class T>

@@ -18,11 +18,10 @@ std::optional<uint64_t> declared_count(const LspHeader& header, Kind kind) {
 bool cells_readable(const LspHeader& header) {
   const LspCellGrid& g = header.cells;
   const auto within = [](uint32_t n, uint32_t most) { return n >= 1 && n <= most; };
-  return within(g.cells_x, LSP_MAX_CELLS) && within(g.cells_y, LSP_MAX_CELLS) && within(g.cells_z, LSP_MAX_CELLS) &&
-         within(g.far_patches, LSP_MAX_CELL_PATCHES) && within(g.origin_patches, LSP_MAX_CELL_PATCHES) &&
-         within(g.sub_cells, LSP_MAX_SUB_CELLS);
+  return within(g.cells_x, LSP_MAX_CELLS) && within(g.cells_y, LSP_MAX_CELLS) &&
+         within(g.cells_z, LSP_MAX_CELLS) && within(g.far_patches, LSP_MAX_CELL_PATCHES) &&
+         within(g.origin_patches, LSP_MAX_CELL_PATCHES) && within(g.sub_cells, LSP_MAX_SUB_CELLS);
 }
-
 
 std::string type_name(uint32_t type) {
   std::string name;

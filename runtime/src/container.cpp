@@ -72,10 +72,11 @@ lsp_status check_cells(const LspHeader& header, lsp_error* error) {
   if (has_cells(header)) {
     const auto within = [](uint32_t n, uint32_t most) { return n >= 1 && n <= most; };
     const auto positive = [](float x) { return x > 0 && std::isfinite(x); };
-    good = within(g.cells_x, LSP_MAX_CELLS) && within(g.cells_y, LSP_MAX_CELLS) && within(g.cells_z, LSP_MAX_CELLS) &&
-           finite(g.lo) && positive(g.size) && positive(g.per_size) && positive(g.margin) && positive(g.box_step) &&
-           within(g.far_patches, LSP_MAX_CELL_PATCHES) && within(g.origin_patches, LSP_MAX_CELL_PATCHES) &&
-           within(g.sub_cells, LSP_MAX_SUB_CELLS) && header.filled_cell_count < LSP_CELL_FILLED;
+    good = within(g.cells_x, LSP_MAX_CELLS) && within(g.cells_y, LSP_MAX_CELLS) &&
+           within(g.cells_z, LSP_MAX_CELLS) && finite(g.lo) && positive(g.size) && positive(g.per_size) &&
+           positive(g.margin) && positive(g.box_step) && within(g.far_patches, LSP_MAX_CELL_PATCHES) &&
+           within(g.origin_patches, LSP_MAX_CELL_PATCHES) && within(g.sub_cells, LSP_MAX_SUB_CELLS) &&
+           header.filled_cell_count < LSP_CELL_FILLED;
   }
   if (good) return LSP_OK;
   return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, cells),

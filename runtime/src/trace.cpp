@@ -19,7 +19,8 @@ extern "C" uint32_t lsp_dial(const lsp_scene* scene, const lsp_trace_options* op
   // Without their triangles cells answer from tables alone.
   if (scene->cell_nodes == nullptr) return LSP_DIAL_TABLES;
   if ((options->flags & LSP_TRACE_MAX_LOSS) == 0)
-    return scene->header->quality[options->quality < LSP_QUALITY_COUNT ? options->quality : LSP_QUALITY_BALANCED];
+    return scene->header
+        ->quality[options->quality < LSP_QUALITY_COUNT ? options->quality : LSP_QUALITY_BALANCED];
   if (options->max_loss >= 100) return LSP_DIAL_TABLES;
   if (!(options->max_loss > 0)) return LSP_DIAL(0u, 0u);
   uint32_t classes = 0;
@@ -43,13 +44,13 @@ extern "C" void lsp_add_counts(lsp_trace_counts* sum, const lsp_trace_counts* mo
 extern "C" lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options* options, const LspRay* rays,
                                 LspHit* hits, uint64_t count, lsp_trace_counts* counts, lsp_error* error) {
   const uint32_t features = scene->header->required_features;
-  const bool approximate =
-      (options->flags & LSP_TRACE_APPROXIMATE) != 0 && (features & (LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS)) != 0;
+  const bool approximate = (options->flags & LSP_TRACE_APPROXIMATE) != 0 &&
+                           (features & (LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS)) != 0;
   if (!approximate && !(features & LSP_FEATURE_EXACT))
     return refuse(error, "the file has no exact tree, trace it approximately or bake it without --no-exact");
   if (approximate && (features & LSP_FEATURE_CELLS) != 0) {
-    lsp::trace_cells(*scene, (options->flags & LSP_TRACE_ANY_HIT) != 0, lsp_dial(scene, options), rays, hits, count,
-                     counts);
+    lsp::trace_cells(*scene, (options->flags & LSP_TRACE_ANY_HIT) != 0, lsp_dial(scene, options), rays, hits,
+                     count, counts);
     return LSP_OK;
   }
   uint32_t flags = options->flags & (approximate ? lsp::kApproximateFlags : lsp::kExactFlags);

@@ -80,7 +80,6 @@ LSP_INLINE inline uint lsp_load_reference(LspScene scene, uint i) {
   return at(scene.references, i, scene.header->reference_count);
 }
 
-
 LSP_FN uint lsp_load_cell_word(LspScene scene, uint i) {
   const LspCellGrid& grid = scene.header->cells;
   return at(scene.cell_words, i, grid.cells_x * grid.cells_y * grid.cells_z);
@@ -92,10 +91,18 @@ LSP_FN uint lsp_load_entry(LspScene scene, uint i) {
 LSP_FN const LspFilledCell& lsp_load_cell_origins(LspScene scene, uint i) {
   return at(scene.filled_cells, i, scene.header->filled_cell_count);
 }
-LSP_FN const LspFilledCell& lsp_load_cell_answers(LspScene scene, uint i) { return lsp_load_cell_origins(scene, i); }
-LSP_FN const LspFilledCell& lsp_load_cell_tree(LspScene scene, uint i) { return lsp_load_cell_origins(scene, i); }
-LSP_FN const LspSplit& lsp_load_split(LspScene scene, uint i) { return at(scene.splits, i, scene.header->split_count); }
-LSP_FN const LspPlane& lsp_load_plane(LspScene scene, uint i) { return at(scene.planes, i, scene.header->plane_count); }
+LSP_FN const LspFilledCell& lsp_load_cell_answers(LspScene scene, uint i) {
+  return lsp_load_cell_origins(scene, i);
+}
+LSP_FN const LspFilledCell& lsp_load_cell_tree(LspScene scene, uint i) {
+  return lsp_load_cell_origins(scene, i);
+}
+LSP_FN const LspSplit& lsp_load_split(LspScene scene, uint i) {
+  return at(scene.splits, i, scene.header->split_count);
+}
+LSP_FN const LspPlane& lsp_load_plane(LspScene scene, uint i) {
+  return at(scene.planes, i, scene.header->plane_count);
+}
 LSP_FN uint lsp_load_plane_record(LspScene scene, uint i) {
   return at(scene.plane_records, i, scene.header->plane_count);
 }

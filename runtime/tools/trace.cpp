@@ -53,10 +53,12 @@ void define(CLI::App& app, Options& options) {
          "--lod", options.lod,
          "Stop at a Line Space once its diagonal is under THETA times the distance; 0: only at the deepest")
       ->check(CLI::Range(0.0f, 1e6f));
-  app.add_option("--quality", options.quality, "Cells: a point of the dial that the bake measured and the file states; without it balanced")
+  app.add_option("--quality", options.quality,
+                 "Cells: a point of the dial that the bake measured and the file states; without it balanced")
       ->check(CLI::IsMember({"fast", "balanced", "accurate"}));
   app.add_option("--max-loss", options.max_loss,
-                 "Cells: trace exactly where entries lose more, in per cent; 100: tables alone, 0: every cell exactly; without it "
+                 "Cells: trace exactly where entries lose more, in per cent; 100: tables alone, 0: every "
+                 "cell exactly; without it "
                  "--quality says")
       ->check(CLI::Range(0.0f, 100.0f));
   app.add_option("--near", options.near, "How to answer where a Line Space's node holds the ray's origin")
@@ -184,7 +186,8 @@ uint64_t physical_memory() {
 void note_unused(const Options& options, const LspHeader& header) {
   const bool cells = (header.required_features & LSP_FEATURE_CELLS) != 0;
   const auto note = [&](bool given, const char* option, const char* why) {
-    if (given) std::cerr << "lsp-trace: " << options.file << ": " << option << " does nothing: " << why << "\n";
+    if (given)
+      std::cerr << "lsp-trace: " << options.file << ": " << option << " does nothing: " << why << "\n";
   };
   const char* const dial = "the file has no cells";
   note(!cells && !options.quality.empty(), "--quality", dial);

@@ -37,7 +37,8 @@ extern "C" lsp_status lsp_vulkan_plan_buffers(const lsp_scene* scene, uint32_t u
   if ((uses & LSP_USE_EXACT) != 0 && (features & LSP_FEATURE_EXACT) == 0) {
     return lsp::fail(error, LSP_ERROR_UNSUPPORTED, 0, "has no exact tree; trace it approximately");
   }
-  if ((uses & LSP_USE_APPROXIMATE) != 0 && (features & (LSP_FEATURE_EXACT | LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS)) == 0) {
+  if ((uses & LSP_USE_APPROXIMATE) != 0 &&
+      (features & (LSP_FEATURE_EXACT | LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS)) == 0) {
     return lsp::fail(error, LSP_ERROR_UNSUPPORTED, 0, "has neither tables nor an exact tree");
   }
   if ((uses & LSP_USE_MATERIALS) != 0 && (features & LSP_FEATURE_MATERIALS) == 0) {

@@ -368,8 +368,9 @@ void VulkanTracer::Impl::record_batch(const lsp_trace_options& options, uint32_t
     vk.vkCmdWriteTimestamp(commands, kCompute, shader_->timer, 0);
   }
   const lsp_vulkan_trace_constants constants{options.lod, 0, count, dial_};
-  lsp_vulkan_record_trace(&device->functions, commands, pipelines_->get(counting, options.flags, dial_ == LSP_DIAL_TABLES),
-                          shader_->layout, shader_->set, &constants);
+  lsp_vulkan_record_trace(&device->functions, commands,
+                          pipelines_->get(counting, options.flags, dial_ == LSP_DIAL_TABLES), shader_->layout,
+                          shader_->set, &constants);
   if (shader_->timer != VK_NULL_HANDLE) vk.vkCmdWriteTimestamp(commands, kCompute, shader_->timer, 1);
   if (batch_.staged()) {
     record_barrier(*device, commands, kCompute, VK_ACCESS_SHADER_WRITE_BIT, kTransfer,

@@ -221,7 +221,8 @@ int main(int argc, char** argv) {
   check(vkAllocateCommandBuffers(gpu.device, &commands_info, &commands), "vkAllocateCommandBuffers");
   const auto begin = make<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
   check(vkBeginCommandBuffer(commands, &begin), "vkBeginCommandBuffer");
-  const lsp_vulkan_trace_constants constants{.lod = 0.0f, .first = 0, .count = 1, .dial = scene.header->quality[LSP_QUALITY_BALANCED]};
+  const lsp_vulkan_trace_constants constants{
+      .lod = 0.0f, .first = 0, .count = 1, .dial = scene.header->quality[LSP_QUALITY_BALANCED]};
   lsp_vulkan_record_trace(&functions, commands, pipeline, layout, set, &constants);
   VkMemoryBarrier done{.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER,
                        .pNext = nullptr,

@@ -227,12 +227,14 @@ int main(int argc, char** argv) {
          "--near", a.near_field,
          "In approximate mode, the Line Space around a ray's origin: exact (default), skip or approximate")
       ->check(CLI::IsMember({"exact", "skip", "approximate"}));
-  app.add_option("--quality", a.quality,
-                 "In approximate mode, of cells: fast, balanced (default) or accurate, as the bake measured them")
+  app.add_option(
+         "--quality", a.quality,
+         "In approximate mode, of cells: fast, balanced (default) or accurate, as the bake measured them")
       ->check(CLI::IsMember({"fast", "balanced", "accurate"}));
-  app.add_option("--max-loss", a.max_loss,
-                 "In approximate mode, of cells: trace exactly where tables lose more, in per cent; 100: tables "
-                 "alone (default: as --quality says)")
+  app.add_option(
+         "--max-loss", a.max_loss,
+         "In approximate mode, of cells: trace exactly where tables lose more, in per cent; 100: tables "
+         "alone (default: as --quality says)")
       ->check(CLI::Range(0.0f, 100.0f));
   app.add_option(
          "--lod", a.lod,

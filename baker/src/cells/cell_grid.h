@@ -41,8 +41,8 @@ struct CellGrid {
 constexpr size_t kMostInCell = LSP_CELL_MAX_REFERENCES - 1;
 
 // `longest` cells lie along the longest side of `bounds`, which holds all triangles. Runs on all threads of
-// the current oneTBB arena; the result does not depend on their number. Throws Failure with Exit::kLimit where
-// a cell holds more than kMostInCell triangles.
+// the current oneTBB arena; the result does not depend on their number. Throws Failure with Exit::kLimit
+// where a cell holds more than kMostInCell triangles.
 CellGrid build_cell_grid(std::span<const LspTriangle> triangles, const Box& bounds, uint32_t longest);
 
 // With as many cells as the scene wants: about kWantedCells of them filled, or as many as it has triangles

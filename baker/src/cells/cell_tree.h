@@ -18,8 +18,8 @@ struct CellTree {
 };
 
 // Of a BVH over a cell's triangles; `lo` is the corner of the cell's box with its margin, `size` its edge.
-// Boxes are rounded outwards. It has fewer than LSP_CELL_MAX_REFERENCES records and at most LSP_MAX_CELL_DEPTH
-// levels.
+// Boxes are rounded outwards. It has fewer than LSP_CELL_MAX_REFERENCES records and at most
+// LSP_MAX_CELL_DEPTH levels.
 CellTree compact(const Bvh& bvh, const glm::vec3& lo, float size);
 
 }  // namespace lsp

@@ -9,7 +9,8 @@
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   lsp::Budget budget(256 << 20);
   try {
-    lsp::decode_draco("fuzz.glb", {{data, size}, {{0, 3, true, true}, {1, 3, false, false}, {2, 2, true, false}}}, budget);
+    lsp::decode_draco(
+        "fuzz.glb", {{data, size}, {{0, 3, true, true}, {1, 3, false, false}, {2, 2, true, false}}}, budget);
   } catch (const lsp::Failure&) {
   }
   return 0;
