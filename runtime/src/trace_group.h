@@ -23,8 +23,10 @@
 // that all give the same bits. What they bring are registers, population counts and three operands: with
 // AVX-512 1.09 to 1.23 times as fast on five meshes, exact and approximate. (Boxes tested four wide with
 // intrinsics were slower, one function with all ten loops by a third.) Not in clang, which takes no address
-// of a template's clones, and not under a sanitizer, whose run time is not up yet when the loader chooses.
-#if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__)
+// of a template's clones, not under a sanitizer, whose run time is not up yet when the loader chooses, and
+// not where nothing is optimised.
+#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__OPTIMIZE__) && !defined(__clang__) && \
+    !defined(__SANITIZE_ADDRESS__)
 #define LSP_CLONES __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
 #else
 #define LSP_CLONES
