@@ -1,16 +1,29 @@
 # What cmake --install puts where: component `runtime` is the library for engines, `programs` the programs.
 include(CMakePackageConfigHelpers)
+set(LSP_CONFIG_NEEDS_ZSTD OFF)
+if(LSP_PACKED AND NOT BUILD_SHARED_LIBS)
+  set(LSP_CONFIG_NEEDS_ZSTD ON)
+endif()
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/lsp)
 
-install(TARGETS lsp lsp_vulkan lsp_layout EXPORT lspTargets
-  ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT runtime)
+set(libraries lsp lsp_layout)
+set(headers interface.h export.h lsp.h scene_file.hpp)
+if(LSP_VULKAN)
+  list(APPEND libraries lsp_vulkan)
+  list(APPEND headers lsp_vulkan.h parts.h)
+endif()
+set(shader_include lsp.glsl lsp_addresses.glsl lsp_descriptors.glsl parts.h traverse.h empty_margin.h bvh.h ntree.h cells.h)
+list(TRANSFORM headers PREPEND include/lsp/)
+list(TRANSFORM shader_include PREPEND include/lsp/)
+
+install(TARGETS ${libraries} EXPORT lspTargets
+  ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT runtime
+  LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT runtime)
 install(EXPORT lspTargets NAMESPACE lsp:: DESTINATION ${package_dir} COMPONENT runtime)
 install(FILES
-  ${CMAKE_SOURCE_DIR}/format-spec/include/lsp/layout.h ${CMAKE_SOURCE_DIR}/format-spec/include/lsp/sections.def
-  ${CMAKE_SOURCE_DIR}/format-spec/include/lsp/program.h
-  include/lsp/interface.h include/lsp/lsp.h include/lsp/lsp_vulkan.h include/lsp/scene_file.hpp include/lsp/lsp.glsl
-  include/lsp/lsp_addresses.glsl include/lsp/lsp_descriptors.glsl include/lsp/cells.h
-  include/lsp/traverse.h include/lsp/empty_margin.h include/lsp/parts.h include/lsp/bvh.h include/lsp/ntree.h
+  ${PROJECT_SOURCE_DIR}/format-spec/include/lsp/layout.h ${PROJECT_SOURCE_DIR}/format-spec/include/lsp/sections.def
+  ${PROJECT_SOURCE_DIR}/format-spec/include/lsp/program.h
+  ${headers} ${shader_include}
   DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/lsp COMPONENT runtime)
 
 configure_package_config_file(cmake/lspConfig.cmake.in ${CMAKE_CURRENT_BINARY_DIR}/lspConfig.cmake
@@ -19,6 +32,17 @@ write_basic_package_version_file(${CMAKE_CURRENT_BINARY_DIR}/lspConfigVersion.cm
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/lspConfig.cmake ${CMAKE_CURRENT_BINARY_DIR}/lspConfigVersion.cmake
   DESTINATION ${package_dir} COMPONENT runtime)
 
+set(LSP_PC_CFLAGS "")
+if(NOT BUILD_SHARED_LIBS)
+  set(LSP_PC_CFLAGS " -DLSP_STATIC")
+  set(LSP_PC_SYSTEM_LIBS " -lstdc++ -lm")
+endif()
+if(LSP_VULKAN)
+  set(LSP_PC_VULKAN "-llsp_vulkan ")
+endif()
+if(LSP_PACKED AND NOT BUILD_SHARED_LIBS)
+  set(LSP_PC_REQUIRES "libzstd")
+endif()
 # The prefix is known only when installing (cmake --install --prefix), so the file is written then.
 configure_file(cmake/lsp.pc.in ${CMAKE_CURRENT_BINARY_DIR}/lsp.pc.in @ONLY)
 install(CODE "
@@ -36,4 +60,4 @@ function(lsp_install_programs)
     endif()
   endforeach()
 endfunction()
-cmake_language(DEFER DIRECTORY ${CMAKE_SOURCE_DIR} CALL lsp_install_programs)
+cmake_language(DEFER DIRECTORY ${PROJECT_SOURCE_DIR} CALL lsp_install_programs)

@@ -5,17 +5,17 @@
 //   header.alignment
 #include <cstring>
 
+#ifdef LSP_PACKED
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 #include <zstd.h>
+#endif
 
 #include "container.h"
 #include "error.h"
 
 namespace lsp {
 namespace {
-
-constexpr uint32_t kZstdMagic = 0xFD2FB528u;
 
 // A zstd block is at least 4 bytes and gives at most 128 KiB: more than this no frame can hold. It keeps a
 // file of a few bytes from asking for terabytes.
@@ -60,6 +60,10 @@ lsp_status check_codecs(const Container& container, lsp_error* error) {
   }
   return LSP_OK;
 }
+
+#ifdef LSP_PACKED
+
+constexpr uint32_t kZstdMagic = 0xFD2FB528u;
 
 bool hash_is(const XXH128_hash_t& hash, uint64_t lo, uint64_t hi) {
   return hash.low64 == lo && hash.high64 == hi;
@@ -143,6 +147,8 @@ lsp_status unpack(const Container& container, const unsigned char* bytes, unsign
   return succeed(error);
 }
 
+#endif
+
 }  // namespace
 }  // namespace lsp
 
@@ -170,6 +176,7 @@ extern "C" lsp_status lsp_unpack(const void* bytes, uint64_t size, void* out, ui
                      "its raw form needs %llu bytes at a multiple of 16, %llu were given",
                      static_cast<unsigned long long>(unpacked), static_cast<unsigned long long>(out_size));
   }
+#ifdef LSP_PACKED
   lsp::Container container;
   lsp::read_container(bytes, size, &container, nullptr);
   ZSTD_DCtx* zstd = ZSTD_createDCtx();
@@ -178,4 +185,9 @@ extern "C" lsp_status lsp_unpack(const void* bytes, uint64_t size, void* out, ui
                                         static_cast<unsigned char*>(out), out_size, zstd, error);
   ZSTD_freeDCtx(zstd);
   return status;
+#else
+  return lsp::fail(
+      error, LSP_ERROR_UNSUPPORTED, 0,
+      "this library was built without LSP_PACKED and cannot unpack; bake the file with --compress none");
+#endif
 }

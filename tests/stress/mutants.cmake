@@ -1,7 +1,7 @@
 # Copies of the tracer's text with one fault each, made when CMake configures, compiled like the text itself.
 # A fault whose place is not found any more is an error: the suite must not lose a check unseen.
 set(mutants_dir ${CMAKE_CURRENT_BINARY_DIR}/variants)
-set(tracer_dir ${CMAKE_SOURCE_DIR}/runtime/include/lsp)
+set(tracer_dir ${PROJECT_SOURCE_DIR}/runtime/include/lsp)
 set(variant_sources)
 set(variants_inc "")
 

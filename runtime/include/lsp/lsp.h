@@ -14,6 +14,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "lsp/export.h"
 #include "lsp/interface.h"
 
 #ifdef __cplusplus
@@ -44,8 +45,8 @@ typedef struct lsp_mapping {
 
 /* Maps the file at `path`. On success the caller owns the mapping and ends it with lsp_unmap_file. `error`
  * may be NULL here and everywhere below. */
-lsp_status lsp_map_file(const char* path, lsp_mapping* mapping, lsp_error* error);
-void lsp_unmap_file(lsp_mapping* mapping);
+LSP_API lsp_status lsp_map_file(const char* path, lsp_mapping* mapping, lsp_error* error);
+LSP_API void lsp_unmap_file(lsp_mapping* mapping);
 
 /* Sections a file may have at most; lsp_open compares each with all others. */
 #define LSP_MAX_SECTIONS 256u
@@ -69,11 +70,11 @@ typedef struct lsp_scene {
 /* Opens the raw (not packed) file in bytes[0, size). `bytes` must be 16-byte aligned and outlive `scene`.
  * Touches the header, the section table and nothing else: the cost does not depend on the file's size, and
  * hashes are not computed (lsp-validate does). A packed file is LSP_ERROR_UNSUPPORTED: unpack it first. */
-lsp_status lsp_open(const void* bytes, uint64_t size, lsp_scene* scene, lsp_error* error);
+LSP_API lsp_status lsp_open(const void* bytes, uint64_t size, lsp_scene* scene, lsp_error* error);
 
 /* What positions in the scene, in rays and in hits are relative to, x y z in the input's space: not zero where single
  * precision would have moved vertices. */
-void lsp_scene_origin(const lsp_scene* scene, double origin[3]);
+LSP_API void lsp_scene_origin(const lsp_scene* scene, double origin[3]);
 
 /* Raw and packed form. header.alignment states the alignment of the raw form, in packed files too. A file with
  * any compressed section is packed: its sections start at multiples of 256 and its length is padded to 256. In
@@ -84,12 +85,14 @@ void lsp_scene_origin(const lsp_scene* scene, double origin[3]);
 
 /* Size of the raw form of the packed or raw file in bytes[0, size), in bytes. `bytes` must be 16-byte aligned
  * and may be hostile: a size that its stored bytes cannot hold is refused, but bound what you allocate. */
-lsp_status lsp_unpacked_size(const void* bytes, uint64_t size, uint64_t* unpacked, lsp_error* error);
+LSP_API lsp_status lsp_unpacked_size(const void* bytes, uint64_t size, uint64_t* unpacked, lsp_error* error);
 
 /* Writes the raw form of the file into `out`, 16-byte aligned, exactly lsp_unpacked_size bytes, not overlapping
  * `bytes`. Header, table and every section are checked against their hashes. After an error `out` holds nothing
- * of use. zstd allocates its working memory here; this is the only function of the library that allocates. */
-lsp_status lsp_unpack(const void* bytes, uint64_t size, void* out, uint64_t out_size, lsp_error* error);
+ * of use. zstd allocates its working memory here; this is the only function of the library that allocates. Of a
+ * library built without LSP_PACKED it is LSP_ERROR_UNSUPPORTED. */
+LSP_API lsp_status lsp_unpack(const void* bytes, uint64_t size, void* out, uint64_t out_size,
+                              lsp_error* error);
 
 /* ---- tracing on the CPU --------------------------------------------------------------------------------- */
 
@@ -110,7 +113,7 @@ typedef struct lsp_trace_options {
 #undef LSP_DEFAULT
 
 /* The dial that the options ask for: the quality's, which the file states, or max_loss's. LSP_DIAL. */
-uint32_t lsp_dial(const lsp_scene* scene, const lsp_trace_options* options);
+LSP_API uint32_t lsp_dial(const lsp_scene* scene, const lsp_trace_options* options);
 
 /* Sums over the rays traced. */
 typedef struct lsp_trace_counts {
@@ -126,15 +129,15 @@ typedef struct lsp_trace_counts {
 } lsp_trace_counts;
 
 /* Adds `more` to *sum, field by field: of threads, or of parts of a set of rays. */
-void lsp_add_counts(lsp_trace_counts* sum, const lsp_trace_counts* more);
+LSP_API void lsp_add_counts(lsp_trace_counts* sum, const lsp_trace_counts* more);
 
 /* Traces rays[0, count) into hits[0, count), in this thread, with some 20 KiB of its stack. Adds to *counts unless it
  * is NULL. Hand it many rays at once: approximate ones are traced in groups of 16, so that while one waits for memory
  * the others go on.
  * LSP_ERROR_UNSUPPORTED when the file lacks what the options need: an exact tree. A file without Line Spaces
  * (a scene too small to need them) answers approximate traces exactly. */
-lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options* options, const LspRay* rays,
-                     LspHit* hits, uint64_t count, lsp_trace_counts* counts, lsp_error* error);
+LSP_API lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options* options, const LspRay* rays,
+                             LspHit* hits, uint64_t count, lsp_trace_counts* counts, lsp_error* error);
 
 #ifdef __cplusplus
 }

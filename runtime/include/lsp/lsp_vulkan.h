@@ -80,8 +80,9 @@ typedef struct lsp_vulkan_plan {
 /* Plans the buffers of an open scene for `uses` (LSP_USE_*). LSP_ERROR_UNSUPPORTED when the file lacks what
  * is asked for; LSP_ERROR_LIMIT when a section is larger than a buffer of the device may be, or than a storage
  * buffer's range and addresses were not allowed. */
-lsp_status lsp_vulkan_plan_buffers(const lsp_scene* scene, uint32_t uses, const lsp_vulkan_limits* limits,
-                                   lsp_vulkan_plan* plan, lsp_error* error);
+LSP_API lsp_status lsp_vulkan_plan_buffers(const lsp_scene* scene, uint32_t uses,
+                                           const lsp_vulkan_limits* limits, lsp_vulkan_plan* plan,
+                                           lsp_error* error);
 
 /* ---- import: no copy ------------------------------------------------------------------------------------
  */
@@ -95,7 +96,8 @@ lsp_status lsp_vulkan_plan_buffers(const lsp_scene* scene, uint32_t uses, const 
  * instead whenever any step fails, a lost device at the first submit included. On a discrete device every
  * read would cross the bus: upload there. Free the memory before the mapping ends; no shader may write to it.
  */
-lsp_status lsp_vulkan_check_import(const lsp_scene* scene, const lsp_vulkan_limits* limits, lsp_error* error);
+LSP_API lsp_status lsp_vulkan_check_import(const lsp_scene* scene, const lsp_vulkan_limits* limits,
+                                           lsp_error* error);
 
 /* ---- upload: one copy -----------------------------------------------------------------------------------
  */
@@ -111,8 +113,8 @@ typedef struct lsp_vulkan_copy {
 /* The piece after *cursor (0 at first, then left alone), at most max_bytes long; 0 when there is none left.
  * Pieces of 1 MiB keep a cold mapping fast. Copy it to mapped device-local memory, or to a staging buffer and
  * record the transfer with lsp_vulkan_record_copy. */
-int lsp_vulkan_next_copy(const lsp_scene* scene, const lsp_vulkan_plan* plan, uint64_t max_bytes,
-                         uint64_t* cursor, lsp_vulkan_copy* copy);
+LSP_API int lsp_vulkan_next_copy(const lsp_scene* scene, const lsp_vulkan_plan* plan, uint64_t max_bytes,
+                                 uint64_t* cursor, lsp_vulkan_copy* copy);
 
 /* ---- recording ------------------------------------------------------------------------------------------
  */
@@ -129,16 +131,17 @@ typedef struct lsp_vulkan_functions {
 } lsp_vulkan_functions;
 
 /* Fills *functions through the engine's vkGetDeviceProcAddr. LSP_ERROR_UNSUPPORTED if one is missing. */
-lsp_status lsp_vulkan_load_functions(VkDevice device, PFN_vkGetDeviceProcAddr get_device_proc_addr,
-                                     lsp_vulkan_functions* functions, lsp_error* error);
+LSP_API lsp_status lsp_vulkan_load_functions(VkDevice device, PFN_vkGetDeviceProcAddr get_device_proc_addr,
+                                             lsp_vulkan_functions* functions, lsp_error* error);
 
 /* Records one piece of the upload from `staging` into `destination`, the buffer of copy->buffer. */
-void lsp_vulkan_record_copy(const lsp_vulkan_functions* functions, VkCommandBuffer commands,
-                            const lsp_vulkan_copy* copy, VkBuffer staging, VkDeviceSize staging_offset,
-                            VkBuffer destination);
+LSP_API void lsp_vulkan_record_copy(const lsp_vulkan_functions* functions, VkCommandBuffer commands,
+                                    const lsp_vulkan_copy* copy, VkBuffer staging,
+                                    VkDeviceSize staging_offset, VkBuffer destination);
 
 /* Records the barrier between the copies and the shaders that read them. */
-void lsp_vulkan_record_upload_barrier(const lsp_vulkan_functions* functions, VkCommandBuffer commands);
+LSP_API void lsp_vulkan_record_upload_barrier(const lsp_vulkan_functions* functions,
+                                              VkCommandBuffer commands);
 
 /* ---- the trace shader -----------------------------------------------------------------------------------
  */
@@ -146,44 +149,45 @@ void lsp_vulkan_record_upload_barrier(const lsp_vulkan_functions* functions, VkC
 /* The parts of the shader that a scene needs: LSP_PART_* of lsp/parts.h. The rest costs time where it is not
  * compiled away; with a part missing that a scene needs its answers are wrong. Cells: a pipeline for the dial
  * LSP_DIAL_TABLES alone does without LSP_PART_CELL_EXACT. */
-uint32_t lsp_vulkan_parts(const lsp_scene* scene);
+LSP_API uint32_t lsp_vulkan_parts(const lsp_scene* scene);
 
 /* SPIR-V (for Vulkan 1.1) of the trace shader for scenes planned like `plan` (of cells: for approximate rays; for exact
  * ones set base_structure of a copy to LSP_BASE_BVH), entry point "main"; with `counting`
  * nonzero the one that adds to the counters. Only base_structure and addresses of the plan matter; with addresses
  * the device's bufferDeviceAddress feature must be on, else no feature is needed. Sets *bytes to the size. The words
  * live as long as the program. */
-const uint32_t* lsp_vulkan_trace_spirv(const lsp_vulkan_plan* plan, int counting, size_t* bytes);
+LSP_API const uint32_t* lsp_vulkan_trace_spirv(const lsp_vulkan_plan* plan, int counting, size_t* bytes);
 
 /* The bindings of its descriptor set layout. */
-void lsp_vulkan_layout_bindings(VkDescriptorSetLayoutBinding bindings[LSP_BINDING_COUNT]);
+LSP_API void lsp_vulkan_layout_bindings(VkDescriptorSetLayoutBinding bindings[LSP_BINDING_COUNT]);
 
 /* Points `set` at the scene's buffers (in the plan's order), and at rays, hits and counters. What the scene
  * has no buffer for is bound to the header's. `counters` may be VK_NULL_HANDLE for the shader that does not
  * count. */
-void lsp_vulkan_write_descriptors(const lsp_vulkan_functions* functions, VkDevice device, VkDescriptorSet set,
-                                  const lsp_vulkan_plan* plan, const VkBuffer* buffers, VkBuffer rays,
-                                  VkBuffer hits, VkBuffer counters);
+LSP_API void lsp_vulkan_write_descriptors(const lsp_vulkan_functions* functions, VkDevice device,
+                                          VkDescriptorSet set, const lsp_vulkan_plan* plan,
+                                          const VkBuffer* buffers, VkBuffer rays, VkBuffer hits,
+                                          VkBuffer counters);
 
 /* Plans with addresses: fills the table that the shader reads them from. `buffer_addresses` are those of the
  * plan's buffers in its order, from vkGetBufferDeviceAddress. The engine puts the table into a storage
  * buffer, and after lsp_vulkan_write_descriptors points the set at it with lsp_vulkan_write_address_table. */
-void lsp_vulkan_address_table(const lsp_vulkan_plan* plan, const VkDeviceAddress* buffer_addresses,
-                              VkDeviceAddress table[LSP_VULKAN_ADDRESS_COUNT]);
-void lsp_vulkan_write_address_table(const lsp_vulkan_functions* functions, VkDevice device,
-                                    VkDescriptorSet set, VkBuffer table);
+LSP_API void lsp_vulkan_address_table(const lsp_vulkan_plan* plan, const VkDeviceAddress* buffer_addresses,
+                                      VkDeviceAddress table[LSP_VULKAN_ADDRESS_COUNT]);
+LSP_API void lsp_vulkan_write_address_table(const lsp_vulkan_functions* functions, VkDevice device,
+                                            VkDescriptorSet set, VkBuffer table);
 
 /* Rays that one dispatch can trace on the device. */
-uint32_t lsp_vulkan_max_rays(const lsp_vulkan_limits* limits);
+LSP_API uint32_t lsp_vulkan_max_rays(const lsp_vulkan_limits* limits);
 
 /* Records the dispatch: binds pipeline and set, pushes the constants, one invocation a ray. Barriers before
  * (rays written by earlier commands) and after (hits read by later ones) are the engine's.
  *
  * A hit whose flags have LSP_HIT_INCOMPLETE set was cut short by the device (lavapipe ends all loops of a
  * SIMD vector after 65,535 iterations) or by the header's declared bounds: trace that ray with lsp_trace. */
-void lsp_vulkan_record_trace(const lsp_vulkan_functions* functions, VkCommandBuffer commands,
-                             VkPipeline pipeline, VkPipelineLayout layout, VkDescriptorSet set,
-                             const lsp_vulkan_trace_constants* constants);
+LSP_API void lsp_vulkan_record_trace(const lsp_vulkan_functions* functions, VkCommandBuffer commands,
+                                     VkPipeline pipeline, VkPipelineLayout layout, VkDescriptorSet set,
+                                     const lsp_vulkan_trace_constants* constants);
 
 #ifdef __cplusplus
 }

@@ -1,0 +1,20 @@
+// Opens a raw file and a packed one. `yes`: the library can unpack.
+#include <cstdio>
+#include <cstring>
+
+#include "lsp/scene_file.hpp"
+
+int main(int argc, char** argv) {
+  if (argc != 4) return 1;
+  const lsp::SceneFile raw(argv[1]);
+  if (raw.unpacked()) return 2;
+  const bool can_unpack = std::strcmp(argv[3], "yes") == 0;
+  try {
+    const lsp::SceneFile packed(argv[2]);
+    if (!can_unpack || !packed.unpacked()) return 3;
+  } catch (const lsp::Failure& failure) {
+    if (can_unpack || failure.exit() != lsp::Exit::kUnsupported) return 4;
+    if (std::strstr(failure.what(), "LSP_PACKED") == nullptr) return 5;
+  }
+  std::puts("embedded ok");
+}
