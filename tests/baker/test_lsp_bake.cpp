@@ -65,12 +65,9 @@ TEST_F(LspBake, GivesTheSameBytesOnAnyNumberOfThreads) {
 
 TEST_F(LspBake, PresetsOfCellsDiffer) {
   write_grid("small.obj", 12);
-  for (const std::string preset : {"fast", "balanced", "accurate"})
-    ASSERT_EQ(run("small.obj --base cells --preset " + preset + " -o " + preset + ".lsp"), 0);
-  EXPECT_FALSE(read("fast.lsp") == read("balanced.lsp"));
-  EXPECT_FALSE(read("balanced.lsp") == read("accurate.lsp"));
-  ASSERT_EQ(run("small.obj --base cells -o default.lsp"), 0);
-  EXPECT_TRUE(read("default.lsp") == read("balanced.lsp"));
+  for (const std::string preset : {"fast", "accurate"})
+    ASSERT_EQ(run("small.obj --base cells --cells 4 --preset " + preset + " -o " + preset + ".lsp"), 0);
+  EXPECT_FALSE(read("fast.lsp") == read("accurate.lsp"));
 }
 
 TEST_F(LspBake, PrintsOneJsonObject) {
