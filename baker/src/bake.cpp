@@ -14,11 +14,10 @@
 #include "lsp/sections.h"
 #include "normals.h"
 #include "sites.h"
+#include "vectors.h"
 
 namespace lsp {
 namespace {
-
-lsp_float3 f3(const glm::vec3& v) { return {v.x, v.y, v.z}; }
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

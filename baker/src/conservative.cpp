@@ -7,13 +7,12 @@
 #include <limits>
 
 #include "lsp/empty_margin.h"
+#include "vectors.h"
 
 namespace lsp {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-glm::dvec3 vec(const lsp_float3& v) { return {v.x, v.y, v.z}; }
 
 constexpr int axis_of(uint32_t face) { return int(face / 2); }
 constexpr int other_axis(int axis, int which) {
@@ -212,7 +211,7 @@ struct Tables {
 }  // namespace
 
 double empty_margin(const LspHeader& header) {
-  const glm::dvec3 lo = vec(header.bounds_min), hi = vec(header.bounds_max);
+  const glm::dvec3 lo = dvec(header.bounds_min), hi = dvec(header.bounds_max);
   const glm::dvec3 extent = hi - lo, reach = glm::max(glm::abs(lo), glm::abs(hi));
   return 2.02 * (double(LSP_EMPTY_EXTENT) * std::max({extent.x, extent.y, extent.z}) +
                  double(LSP_EMPTY_REACH) * std::max({reach.x, reach.y, reach.z}));
@@ -245,7 +244,7 @@ class TouchedShafts::Impl {
     Polygon whole;
     bool inside = true;
     for (const lsp_float3& v : {triangle.v0, triangle.v1, triangle.v2}) {
-      const glm::dvec3 x = (vec(v) - lo_) * scale_;
+      const glm::dvec3 x = (dvec(v) - lo_) * scale_;
       whole.push(x.x, x.y, x.z);
       for (int k = 0; k < 3; ++k) inside = inside && x[k] >= margin_[k] && x[k] <= 1 - margin_[k];
     }

@@ -8,20 +8,17 @@
 
 #include "lsp/lsp.h"
 #include "surface_rays.h"
+#include "vectors.h"
 
 namespace lsp {
-namespace {
-
-glm::dvec3 vec(const lsp_float3& v) { return {v.x, v.y, v.z}; }
-
-}  // namespace
+namespace {}  // namespace
 
 MeasuredError measure_error(const Baked& baked, uint64_t rays) {
   constexpr uint32_t kTables = LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS;
   const uint32_t features = baked.header.required_features;
   if (!(features & LSP_FEATURE_EXACT) || !(features & kTables) || baked.triangles.empty()) return {};
   const lsp_scene scene = view(baked);
-  const glm::dvec3 extent = vec(baked.header.bounds_max) - vec(baked.header.bounds_min);
+  const glm::dvec3 extent = dvec(baked.header.bounds_max) - dvec(baked.header.bounds_min);
   const double diagonal = glm::length(extent);
 
   const SurfaceRays make(baked);

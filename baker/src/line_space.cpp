@@ -14,12 +14,11 @@
 #include "lsp/lsp.h"
 #include "lsp/program.h"
 #include "shaft_raster.h"
+#include "vectors.h"
 
 namespace lsp {
 namespace {
 
-glm::vec3 vec(const lsp_float3& v) { return {v.x, v.y, v.z}; }
-lsp_float3 f3(const glm::vec3& v) { return {v.x, v.y, v.z}; }
 constexpr uint32_t kFirstSamples = 3;
 constexpr float kSettled = 0.01f;  // mean error, in lengths of the shaft, under which a plane is good enough
 

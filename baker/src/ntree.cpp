@@ -10,14 +10,13 @@
 
 #include "box.h"
 #include "lsp/program.h"
+#include "vectors.h"
 
 namespace lsp {
 namespace {
 
 using Cell3 = glm::ivec3;
 constexpr float kLeastCell = 2;  // margins
-
-glm::dvec3 vec(const lsp_float3& v) { return {v.x, v.y, v.z}; }
 
 // Does a triangle, its corners given from the centre of a cube, reach into the cube of this half edge?
 // Separating axes (Akenine-Moeller, "Fast 3D Triangle-Box Overlap Testing", 2001); the nine axes and the
@@ -92,10 +91,10 @@ class Builder {
   template <typename F>
   void for_each_cell(uint32_t triangle, const Cell3& origin, double cell, F&& f) const {
     const LspTriangle& t = triangles_[triangle];
-    const glm::dvec3 v[3] = {vec(t.v0), vec(t.v1), vec(t.v2)};
+    const glm::dvec3 v[3] = {dvec(t.v0), dvec(t.v1), dvec(t.v2)};
     const glm::dvec3 lo = glm::min(glm::min(v[0], v[1]), v[2]) - double(tree_.margin);
     const glm::dvec3 hi = glm::max(glm::max(v[0], v[1]), v[2]) + double(tree_.margin);
-    const glm::dvec3 corner = vec(tree_.lo) + glm::dvec3(origin) * cell;
+    const glm::dvec3 corner = dvec(tree_.lo) + glm::dvec3(origin) * cell;
     const int n = int(options_.branching);
     const auto clamp = [n](double x) { return int(std::clamp(std::floor(x), 0.0, double(n - 1))); };
     int first[3], last[3];

@@ -4,27 +4,21 @@
 #include <cmath>
 
 #include "lsp/lsp.h"
+#include "pcg.h"
+#include "vectors.h"
 
 namespace lsp {
 namespace {
 
 constexpr double kOffset = 1e-4;  // of the diagonal
 
-// PCG-RXS-M-XS 32 (O'Neill 2014) as a hash of a counter: any ray can be made without the ones before it.
 double random(uint64_t ray, uint32_t dimension) {
-  uint32_t x = uint32_t(ray) * 747796405u + uint32_t(ray >> 32) * 277803737u + dimension * 2891336453u + 1u;
-  for (int i = 0; i < 2; ++i) {
-    x = x * 747796405u + 2891336453u;
-    x = ((x >> ((x >> 28) + 4)) ^ x) * 277803737u;
-    x = (x >> 22) ^ x;
-  }
-  return (x + 0.5) / 4294967296.0;
+  const uint32_t seed =
+      uint32_t(ray) * 747796405u + uint32_t(ray >> 32) * 277803737u + dimension * 2891336453u + 1u;
+  return (pcg(seed) + 0.5) / 4294967296.0;
 }
 
-glm::dvec3 vec(const lsp_float3& v) { return {v.x, v.y, v.z}; }
-lsp_float3 f3(const glm::dvec3& v) { return {float(v.x), float(v.y), float(v.z)}; }
-
-double diagonal(const LspHeader& h) { return glm::length(vec(h.bounds_max) - vec(h.bounds_min)); }
+double diagonal(const LspHeader& h) { return glm::length(dvec(h.bounds_max) - dvec(h.bounds_min)); }
 
 // Uniform on the unit sphere with square roots only, so that every machine makes the same (Marsaglia 1972).
 glm::dvec3 on_sphere(uint64_t ray, uint32_t dimension) {
@@ -44,7 +38,7 @@ glm::dvec3 cosine_direction(const glm::dvec3& n, uint64_t ray) {
 }
 
 glm::dvec3 geometric_normal(const LspTriangle& t) {
-  return glm::normalize(glm::cross(vec(t.v1) - vec(t.v0), vec(t.v2) - vec(t.v0)));
+  return glm::normalize(glm::cross(dvec(t.v1) - dvec(t.v0), dvec(t.v2) - dvec(t.v0)));
 }
 
 }  // namespace
@@ -54,7 +48,7 @@ SurfaceRays::SurfaceRays(const Baked& baked) : baked_(baked), offset_(kOffset * 
   // primitives.
   double total = 0;
   for (const LspTriangle& t : baked.triangles) {
-    total += glm::length(glm::cross(vec(t.v1) - vec(t.v0), vec(t.v2) - vec(t.v0)));
+    total += glm::length(glm::cross(dvec(t.v1) - dvec(t.v0), dvec(t.v2) - dvec(t.v0)));
     area_.push_back(total);
   }
 }
@@ -68,9 +62,9 @@ LspRay SurfaceRays::make(uint64_t point, uint64_t ray) const {
     u = 1 - u;
     v = 1 - v;
   }
-  const glm::dvec3 a = vec(t.v1) - vec(t.v0), b = vec(t.v2) - vec(t.v0);
+  const glm::dvec3 a = dvec(t.v1) - dvec(t.v0), b = dvec(t.v2) - dvec(t.v0);
   const glm::dvec3 n = geometric_normal(t);
-  const glm::dvec3 o = vec(t.v0) + a * u + b * v + n * offset_;
+  const glm::dvec3 o = dvec(t.v0) + a * u + b * v + n * offset_;
   return {f3(o), 0, f3(cosine_direction(n, ray)), INFINITY};
 }
 
@@ -84,7 +78,7 @@ std::vector<LspRay> surface_rays(const Baked& baked, uint32_t points, uint32_t p
 
 std::vector<LspRay> seen_rays(const Baked& baked, uint32_t points, uint32_t per_point) {
   const LspHeader& h = baked.header;
-  const glm::dvec3 lo = vec(h.bounds_min), extent = vec(h.bounds_max) - lo;
+  const glm::dvec3 lo = dvec(h.bounds_min), extent = dvec(h.bounds_max) - lo;
   const lsp_scene scene = view(baked);
   std::vector<uint32_t> records(h.primitive_count);
   for (size_t i = 0; i < baked.triangles.size(); ++i) records[baked.triangles[i].primitive] = uint32_t(i);
@@ -104,10 +98,10 @@ std::vector<LspRay> seen_rays(const Baked& baked, uint32_t points, uint32_t per_
     if (lsp_trace(&scene, &exact, &look, &hit, 1, nullptr, nullptr) != LSP_OK || hit.primitive == LSP_NONE)
       continue;
     const glm::dvec3 n = geometric_normal(baked.triangles[records[hit.primitive]]);
-    const glm::dvec3 d = vec(look.direction);
+    const glm::dvec3 d = dvec(look.direction);
     // From the back of a closed object nobody sees it.
     if (glm::dot(n, d) > 0) continue;
-    const glm::dvec3 o = vec(look.origin) + d * double(hit.t) + n * (kOffset * diagonal(h));
+    const glm::dvec3 o = dvec(look.origin) + d * double(hit.t) + n * (kOffset * diagonal(h));
     for (uint32_t k = 0; k < per_point; ++k)
       rays.push_back({f3(o), 0, f3(cosine_direction(n, seed * per_point + k)), INFINITY});
   }

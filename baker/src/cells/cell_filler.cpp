@@ -5,6 +5,8 @@
 #include <cmath>
 #include <map>
 
+#include "../pcg.h"
+#include "../vectors.h"
 #include "box.h"
 #include "lsp/lsp.h"
 #include "lsp/program.h"
@@ -18,18 +20,9 @@ constexpr float kSubMargin = 0.02f;    // of a sub-cell's edge: what comes this 
 constexpr float kSameDirection = 0.9999f;
 constexpr float kSameDistance = 1e-3f;  // of a cell's edge
 
-glm::vec3 vec(const lsp_float3& v) { return {v.x, v.y, v.z}; }
-lsp_float3 f3(const glm::vec3& v) { return {v.x, v.y, v.z}; }
-
-// PCG-RXS-M-XS 32 (O'Neill 2014) as a hash, to [0, 1).
+// A hash, to [0, 1).
 float hash(uint32_t a, uint32_t b, uint32_t c) {
-  uint32_t x = a * 747796405u + b * 277803737u + c * 2891336453u + 1u;
-  for (int i = 0; i < 2; ++i) {
-    x = x * 747796405u + 2891336453u;
-    x = ((x >> ((x >> 28) + 4)) ^ x) * 277803737u;
-    x = (x >> 22) ^ x;
-  }
-  return float(x >> 8) * 0x1p-24f;
+  return float(pcg(a * 747796405u + b * 277803737u + c * 2891336453u + 1u) >> 8) * 0x1p-24f;
 }
 
 // An additive low-discrepancy sequence (Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences",

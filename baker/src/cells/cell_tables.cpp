@@ -6,6 +6,7 @@
 #include <atomic>
 #include <bit>
 
+#include "../vectors.h"
 #include "cell_filler.h"
 
 namespace lsp {
@@ -13,8 +14,6 @@ namespace {
 
 constexpr float kOffset = 1e-4f;  // of the scene's diagonal, as renderers move ray origins off the surface
 constexpr size_t kBatch = 256;    // cells that are filled before they are packed
-
-glm::vec3 vec(const lsp_float3& v) { return {v.x, v.y, v.z}; }
 
 // Appends entries to words that hold `count` so far.
 void append(std::span<const uint16_t> entries, std::vector<uint32_t>& words, uint64_t& count) {
