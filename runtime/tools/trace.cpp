@@ -9,6 +9,7 @@
 
 #include "lsp/command_line.h"
 #include "lsp/scene_file.hpp"
+#include "lsp/trace_arguments.hpp"
 #include "ray_files.h"
 #include "trace_run.h"
 
@@ -22,13 +23,10 @@ struct Options {
   std::string backend = "cpu";
   std::string mode;  // empty: approximate where the file has Line Spaces, else exact
   std::string query = "closest";
-  std::string near = "exact";
   std::string load_path = "automatic";
   std::string device;
   bool skip_empty = false;
-  float lod = 0;
-  std::string quality;  // empty: balanced
-  float max_loss = -1;  // negative: the quality's
+  TraceArguments trace;
   uint32_t repeats = 1;
   uint32_t threads = std::max(1u, std::thread::hardware_concurrency());
   CommonOptions common;
@@ -49,20 +47,7 @@ void define(CLI::App& app, Options& options) {
       ->check(CLI::IsMember({"exact", "approximate"}));
   app.add_option("--query", options.query, "The closest hit or any hit")
       ->check(CLI::IsMember({"closest", "any"}));
-  app.add_option(
-         "--lod", options.lod,
-         "Stop at a Line Space once its diagonal is under THETA times the distance; 0: only at the deepest")
-      ->check(CLI::Range(0.0f, 1e6f));
-  app.add_option("--quality", options.quality,
-                 "Cells: a point of the dial that the bake measured and the file states; without it balanced")
-      ->check(CLI::IsMember({"fast", "balanced", "accurate"}));
-  app.add_option("--max-loss", options.max_loss,
-                 "Cells: trace exactly where entries lose more, in per cent; 100: tables alone, 0: every "
-                 "cell exactly; without it "
-                 "--quality says")
-      ->check(CLI::Range(0.0f, 100.0f));
-  app.add_option("--near", options.near, "How to answer where a Line Space's node holds the ray's origin")
-      ->check(CLI::IsMember({"exact", "skip", "approximate"}));
+  add_trace_arguments(app, options.trace);
   app.add_flag("--skip-empty", options.skip_empty,
                "Exact: leave out nodes whose shaft a conservative Line Space proves empty; the same answers");
   app.add_option("--repeat", options.repeats, "Times to trace all rays")->check(CLI::Range(1u, 1000000u));
@@ -86,19 +71,9 @@ TraceRequest make_request(const Options& options, const LspHeader& header) {
   TraceRequest request;
   const bool line_spaces = (header.required_features & (LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS)) != 0;
   const bool approximate = options.mode.empty() ? line_spaces : options.mode == "approximate";
-  if (approximate) request.options.flags |= LSP_TRACE_APPROXIMATE;
+  request.options = to_trace_options(options.trace, approximate);
   if (options.query == "any") request.options.flags |= LSP_TRACE_ANY_HIT;
-  if (options.near == "approximate") request.options.flags |= LSP_TRACE_NEAR_APPROXIMATE;
-  if (options.near == "skip") request.options.flags |= LSP_TRACE_NEAR_SKIP;
   if (options.skip_empty) request.options.flags |= LSP_TRACE_SKIP_EMPTY;
-  request.options.lod = options.lod;
-  request.options.quality = options.quality == "fast"       ? LSP_QUALITY_FAST
-                            : options.quality == "accurate" ? LSP_QUALITY_ACCURATE
-                                                            : LSP_QUALITY_BALANCED;
-  if (options.max_loss >= 0) {
-    request.options.flags |= LSP_TRACE_MAX_LOSS;
-    request.options.max_loss = options.max_loss;
-  }
   request.vulkan = options.backend == "vulkan";
   request.repeats = options.repeats;
   request.threads = options.threads;
@@ -119,9 +94,9 @@ nlohmann::ordered_json to_json(const Options& options, const TraceRequest& reque
   json["backend"] = options.backend;
   json["mode"] = (request.options.flags & LSP_TRACE_APPROXIMATE) != 0 ? "approximate" : "exact";
   json["query"] = options.query;
-  json["near"] = options.near;
+  json["near"] = options.trace.near;
   json["skip_empty"] = options.skip_empty;
-  json["lod"] = options.lod;
+  json["lod"] = options.trace.lod;
   json["threads"] = request.vulkan ? 0u : options.threads;
   json["rays"] = counts.rays;
   json["invalid"] = counts.invalid;
@@ -140,8 +115,8 @@ nlohmann::ordered_json to_json(const Options& options, const TraceRequest& reque
   json["bytes_uploaded"] = report.bytes_uploaded;
   json["retraced"] = report.retraced;
   if ((file.scene().header->required_features & LSP_FEATURE_CELLS) != 0) {
-    json["quality"] = options.quality.empty() ? "balanced" : options.quality;
-    if (options.max_loss >= 0) json["max_loss"] = options.max_loss;
+    json["quality"] = options.trace.quality_name();
+    if (options.trace.max_loss >= 0) json["max_loss"] = options.trace.max_loss;
     json["steps_per_ray"] = per(static_cast<double>(counts.nodes), counts.rays);
     json["lookups_per_ray"] = per(static_cast<double>(counts.shafts), counts.rays);
     json["splits_per_ray"] = per(static_cast<double>(counts.splits), counts.rays);
@@ -182,28 +157,18 @@ uint64_t physical_memory() {
   return pages > 0 && page > 0 ? static_cast<uint64_t>(pages) * static_cast<uint64_t>(page) : UINT64_MAX;
 }
 
-// Options that this file gives no meaning: said, not ignored in silence.
-void note_unused(const Options& options, const LspHeader& header) {
-  const bool cells = (header.required_features & LSP_FEATURE_CELLS) != 0;
-  const auto note = [&](bool given, const char* option, const char* why) {
-    if (given)
-      std::cerr << "lsp-trace: " << options.file << ": " << option << " does nothing: " << why << "\n";
-  };
-  const char* const dial = "the file has no cells";
-  note(!cells && !options.quality.empty(), "--quality", dial);
-  note(!cells && options.max_loss >= 0, "--max-loss", dial);
-  const char* const tree = "the file has cells, see --quality";
-  note(cells && options.lod > 0, "--lod", tree);
-  note(cells && options.near != "exact", "--near", tree);
-  note(cells && options.skip_empty, "--skip-empty", tree);
-}
-
 Exit run(const Options& options) {
   const SceneFile file(options.file, physical_memory());
-  if (!options.common.quiet) note_unused(options, file.header());
   const std::vector<LspRay> rays = read_rays(options.rays);
   std::vector<LspHit> hits(rays.size());
   const TraceRequest request = make_request(options, file.header());
+  if (!options.common.quiet) {
+    const bool approximate = (request.options.flags & LSP_TRACE_APPROXIMATE) != 0;
+    for (const std::string& note : unused_arguments(options.trace, approximate, file.header()))
+      std::cerr << "lsp-trace: " << options.file << ": " << note << "\n";
+    if (options.skip_empty && (file.header().required_features & LSP_FEATURE_CELLS) != 0)
+      std::cerr << "lsp-trace: " << options.file << ": --skip-empty does nothing: the file has cells\n";
+  }
   nlohmann::ordered_json json;
   try {
     json = to_json(options, request, file, trace_rays(file.scene(), file.unpacked(), request, rays, hits));

@@ -8,6 +8,7 @@
 
 #include "lsp/command_line.h"
 #include "lsp/lsp_vulkan.h"
+#include "lsp/trace_arguments.hpp"
 #include "renderer.h"
 
 namespace lsp::sample {
@@ -18,10 +19,7 @@ struct Arguments {
   std::vector<std::string> outputs;
   std::string effect = "all";
   std::string mode = "exact";
-  std::string near_field = "exact";
-  float lod = 0;
-  std::string quality;  // empty: balanced
-  float max_loss = -1;  // negative: the quality's
+  TraceArguments trace;
   std::string camera;
   std::string size = "960x540";
   std::string backend = "cpu";
@@ -62,42 +60,6 @@ Effect parse_effect(const std::string& name) {
   return Effect::kAll;
 }
 
-lsp_trace_options indirect_of(const Arguments& a) {
-  lsp_trace_options options{};
-  if (a.mode != "approximate") return options;
-  options.flags = LSP_TRACE_APPROXIMATE;
-  if (a.near_field == "approximate") options.flags |= LSP_TRACE_NEAR_APPROXIMATE;
-  if (a.near_field == "skip") options.flags |= LSP_TRACE_NEAR_SKIP;
-  options.lod = a.lod;
-  options.quality = a.quality == "fast"       ? LSP_QUALITY_FAST
-                    : a.quality == "accurate" ? LSP_QUALITY_ACCURATE
-                                              : LSP_QUALITY_BALANCED;
-  if (a.max_loss >= 0) {
-    options.flags |= LSP_TRACE_MAX_LOSS;
-    options.max_loss = a.max_loss;
-  }
-  return options;
-}
-
-// What of the options this file gives no meaning.
-std::vector<std::string> unused(const Arguments& a, const LspHeader& header) {
-  std::vector<std::string> notes;
-  const auto note = [&](bool given, const std::string& option, const char* why) {
-    if (given) notes.push_back(option + " does nothing: " + why);
-  };
-  const bool cells = (header.required_features & LSP_FEATURE_CELLS) != 0;
-  const bool exact = a.mode != "approximate";
-  const char* const why = exact ? "--mode is exact" : "the file has no cells";
-  note(!a.quality.empty() && (exact || !cells), "--quality", why);
-  note(a.max_loss >= 0 && (exact || !cells), "--max-loss", why);
-  const char* const tree = exact ? "--mode is exact" : "the file has cells, see --quality";
-  note(a.near_field != "exact" && (exact || cells), "--near", tree);
-  note(a.lod > 0 && (exact || cells), "--lod", tree);
-  if (!exact && !cells && (header.required_features & LSP_FEATURE_LINE_SPACES) == 0)
-    notes.push_back("neither cells nor Line Spaces in the file: approximate rays are exact");
-  return notes;
-}
-
 double mega(uint64_t rays, double seconds) {
   return seconds > 0 ? static_cast<double>(rays) / seconds * 1e-6 : 0;
 }
@@ -105,7 +67,8 @@ double mega(uint64_t rays, double seconds) {
 void run(const Arguments& arguments, const CommonOptions& common, const char* program) {
   RenderOptions options = arguments.options;
   options.effect = parse_effect(arguments.effect);
-  options.indirect = indirect_of(arguments);
+  const bool approximate = arguments.mode == "approximate";
+  options.indirect = to_trace_options(arguments.trace, approximate);
   parse_size(arguments.size, options);
   for (const std::string& output : arguments.outputs) {
     const std::filesystem::path ending = std::filesystem::path(output).extension();
@@ -125,10 +88,15 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
   if (!common.quiet) {
     for (const std::string& note : scene.notes())
       std::cerr << program << ": " << arguments.file << ": " << note << "\n";
-    for (const std::string& note : unused(arguments, *scene.view().header))
+    const LspHeader& header = *scene.view().header;
+    for (const std::string& note : unused_arguments(arguments.trace, approximate, header))
       std::cerr << program << ": " << arguments.file << ": " << note << "\n";
+    if (approximate && (header.required_features & (LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS)) == 0) {
+      std::cerr << program << ": " << arguments.file
+                << ": neither Line Spaces nor cells in the file: approximate rays are exact\n";
+    }
   }
-  const uint32_t uses = LSP_USE_EXACT | (options.indirect.flags != 0 ? LSP_USE_APPROXIMATE : 0u);
+  const uint32_t uses = LSP_USE_EXACT | (approximate ? LSP_USE_APPROXIMATE : 0u);
   const auto tracer = arguments.backend == "vulkan" ? make_vulkan_tracer(scene, uses)
                                                     : make_cpu_tracer(scene, options.threads);
   if (arguments.camera.empty()) {
@@ -170,8 +138,8 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
                                         {"outputs", arguments.outputs},
                                         {"effect", arguments.effect},
                                         {"mode", arguments.mode},
-                                        {"near", arguments.near_field},
-                                        {"lod", arguments.lod},
+                                        {"near", arguments.trace.near},
+                                        {"lod", arguments.trace.lod},
                                         {"width", options.width},
                                         {"height", options.height},
                                         {"samples", options.samples},
@@ -223,23 +191,7 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember({"ao", "diffuse", "glossy", "all", "direct"}));
   app.add_option("--mode", a.mode, "exact or approximate (default exact)")
       ->check(CLI::IsMember({"exact", "approximate"}));
-  app.add_option(
-         "--near", a.near_field,
-         "In approximate mode, the Line Space around a ray's origin: exact (default), skip or approximate")
-      ->check(CLI::IsMember({"exact", "skip", "approximate"}));
-  app.add_option(
-         "--quality", a.quality,
-         "In approximate mode, of cells: fast, balanced (default) or accurate, as the bake measured them")
-      ->check(CLI::IsMember({"fast", "balanced", "accurate"}));
-  app.add_option(
-         "--max-loss", a.max_loss,
-         "In approximate mode, of cells: trace exactly where tables lose more, in per cent; 100: tables "
-         "alone (default: as --quality says)")
-      ->check(CLI::Range(0.0f, 100.0f));
-  app.add_option(
-         "--lod", a.lod,
-         "Stop at a Line Space once its diagonal is under LOD times the distance (default 0: deepest only)")
-      ->check(CLI::Range(0.0f, 1e6f));
+  add_trace_arguments(app, a.trace);
   app.add_option("--camera", a.camera,
                  "X,Y,Z:X,Y,Z:FOV: eye, target, vertical angle in degrees (default: from the scene)");
   app.add_option("--size", a.size, "WxH in pixels (default 960x540)");
