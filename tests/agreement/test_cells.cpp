@@ -209,6 +209,21 @@ TEST(Cells, ACrowdedCellIsDividedOrRefused) {
   for (const Cell& cell : chosen.cell_grid.cells) EXPECT_LE(cell.count, kMostInCell);
 }
 
+// No grid divides a heap of triangles in one place: that is said soon, not after grids of a thousand cells.
+TEST(Cells, AHeapInOnePlaceIsRefused) {
+  Mesh mesh;
+  for (uint32_t i = 0; i < LSP_CELL_MAX_REFERENCES; ++i) add_triangle(mesh, {0, 0, 0}, {1, 0, 0}, {0, 1, 0});
+  add_triangle(mesh, {500, 500, 500}, {500, 501, 500}, {500, 500, 501});
+  BakeOptions options = options_of_cells();
+  options.cells = 0;
+  try {
+    bake(mesh, options);
+    FAIL() << "a cell holds them all";
+  } catch (const Failure& f) {
+    EXPECT_EQ(f.exit(), Exit::kLimit);
+  }
+}
+
 class CellsOnVulkan : public testing::TestWithParam<uint32_t> {};
 
 TEST_P(CellsOnVulkan, SameBits) {

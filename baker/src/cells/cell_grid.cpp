@@ -6,6 +6,7 @@
 #include <cmath>
 #include <string>
 
+#include "../vectors.h"
 #include "conservative.h"
 #include "lsp/program.h"
 
@@ -17,9 +18,8 @@ constexpr float kMargin = 1e-4f;  // of a cell's edge
 constexpr size_t kWantedCells = 1200;
 constexpr size_t kTrianglesPerCell = 8;
 constexpr uint32_t kMostLongest = 96;
-constexpr size_t kPart = 4096;  // triangles that one task sorts into cells
-
-glm::vec3 vec(const lsp_float3& v) { return {v.x, v.y, v.z}; }
+constexpr size_t kMostCells = size_t(1) << 24;  // about: of a grid refined for the fullest cell
+constexpr size_t kPart = 4096;                  // triangles that one task sorts into cells
 
 struct Reference {
   uint32_t cell, record;
@@ -75,6 +75,7 @@ void add_jumps(CellGrid& grid) {
   }
 }
 
+// The grid but for its jumps.
 CellGrid sort_into_cells(std::span<const LspTriangle> triangles, const Box& bounds, uint32_t longest) {
   CellGrid grid;
   const glm::vec3 extent = bounds.extent();
@@ -129,7 +130,6 @@ CellGrid sort_into_cells(std::span<const LspTriangle> triangles, const Box& boun
                           uint32_t(cell_records.size())});
     grid.records.insert(grid.records.end(), cell_records.begin(), cell_records.end());
   }
-  add_jumps(grid);
   return grid;
 }
 
@@ -139,19 +139,20 @@ size_t fullest(const CellGrid& grid) {
   return most;
 }
 
-CellGrid refuse_crowded(CellGrid grid) {
+CellGrid finish(CellGrid grid) {
   const size_t most = fullest(grid);
   if (most > kMostInCell)
     throw Failure(Exit::kLimit, "",
                   "a cell would hold " + std::to_string(most) + " triangles, and it can hold " +
                       std::to_string(kMostInCell) + ": give more --cells, or --base bvh");
+  add_jumps(grid);
   return grid;
 }
 
 }  // namespace
 
 CellGrid build_cell_grid(std::span<const LspTriangle> triangles, const Box& bounds, uint32_t longest) {
-  return refuse_crowded(sort_into_cells(triangles, bounds, longest));
+  return finish(sort_into_cells(triangles, bounds, longest));
 }
 
 CellGrid choose_cell_grid(std::span<const LspTriangle> triangles, const Box& bounds) {
@@ -167,11 +168,11 @@ CellGrid choose_cell_grid(std::span<const LspTriangle> triangles, const Box& bou
     longest = next;
     grid = sort_into_cells(triangles, bounds, longest);
   }
-  while (longest < uint32_t(LSP_MAX_CELLS) && fullest(grid) > kMostInCell) {
-    longest = std::min(longest + longest / 16 + 1, uint32_t(LSP_MAX_CELLS));
+  while (longest < LSP_MAX_CELLS && grid.words.size() < kMostCells && fullest(grid) > kMostInCell) {
+    longest = std::min(longest + longest / 16 + 1, LSP_MAX_CELLS);
     grid = sort_into_cells(triangles, bounds, longest);
   }
-  return refuse_crowded(std::move(grid));
+  return finish(std::move(grid));
 }
 
 }  // namespace lsp

@@ -46,7 +46,8 @@ constexpr size_t kMostInCell = LSP_CELL_MAX_REFERENCES - 1;
 CellGrid build_cell_grid(std::span<const LspTriangle> triangles, const Box& bounds, uint32_t longest);
 
 // With as many cells as the scene wants: about kWantedCells of them filled, or as many as it has triangles
-// for, and more where a cell would be too full. Throws as above where the most cells do not help.
+// for, and more where a cell would be too full, up to some kMostCells: throws as above where that does not
+// help.
 CellGrid choose_cell_grid(std::span<const LspTriangle> triangles, const Box& bounds);
 
 }  // namespace lsp
