@@ -206,8 +206,7 @@ Exit run(Arguments a) {
     throw Failure(Exit::kUsage, "", "--max-error needs Line Spaces with candidates");
   if ((a.conservative || a.directed) && (a.purpose != Purpose::kVisibility || a.no_line_spaces))
     throw Failure(Exit::kUsage, "", "--conservative and --directed need the Line Spaces of --for visibility");
-  const Preset& chosen = kPresets.at(a.preset);
-  const Quality& preset = chosen.line_spaces;
+  const Preset& preset = kPresets.at(a.preset);
   const bool ntree = a.base == "ntree";
   if (!ntree && (a.branching || a.levels != kNTreeLevels))
     throw Failure(Exit::kUsage, "", "--branching and --levels need --base ntree");
@@ -223,12 +222,12 @@ Exit run(Arguments a) {
     throw Failure(Exit::kUsage, "", "--for visibility needs Line Spaces: leave out --base cells");
   if (ntree && a.max_error > 0)
     throw Failure(Exit::kUsage, "", "--max-error chooses among BVHs, leave out --base");
-  if (!a.resolution_given) a.resolution = preset.resolution;
+  if (!a.resolution_given) a.resolution = preset.line_spaces.resolution;
   if (ntree && !a.branching) a.branching = std::clamp(a.resolution, 2u, LSP_MAX_BRANCHING);
   // At depth 1 an NTree's error costs the fewest bytes: bunny, N = 6, 1.2 % wrong and 13 MB against 0.3 % and
   // 142 MB.
-  if (!a.depth_given) a.depths = {ntree ? std::min(a.levels - 1, 1u) : preset.depth};
-  if (!a.samples_given) a.samples = preset.samples;
+  if (!a.depth_given) a.depths = {ntree ? std::min(a.levels - 1, 1u) : preset.line_spaces.depth};
+  if (!a.samples_given) a.samples = preset.line_spaces.samples;
   if (a.no_line_spaces && a.no_exact)
     throw Failure(Exit::kUsage, "", "--no-line-spaces with --no-exact leaves nothing to trace");
   std::unique_ptr<tbb::global_control> control;
@@ -259,8 +258,8 @@ Exit run(Arguments a) {
   options.line_spaces = !a.no_line_spaces;
   options.base = ntree ? Base::kNTree : cells ? Base::kCells : Base::kBvh;
   options.cells = a.cells;
-  options.cell_tables.far_samples = chosen.far_samples;
-  options.cell_tables.origin_samples = chosen.origin_samples;
+  options.cell_tables.far_samples = preset.far_samples;
+  options.cell_tables.origin_samples = preset.origin_samples;
   options.ntree.branching = a.branching;
   options.ntree.levels = a.levels;
   options.bvh.spatial_splits = !a.no_splits;

@@ -115,15 +115,14 @@ void choose_dial(Baked& baked) {
   for (uint32_t near : kClasses)
     for (uint32_t far : kClasses) {
       h.quality[LSP_QUALITY_BALANCED] = LSP_DIAL(near, far);
-      DialError errors[2] = {measure(scene, sets[0], diagonal)};
+      const DialError surface = measure(scene, sets[0], diagonal);
       // What no choice can take is not measured further.
-      if (!within(errors[0], balanced.share) || errors[0].cost >= std::max(balanced.cost, accurate.cost))
+      if (!within(surface, balanced.share) || surface.cost >= std::max(balanced.cost, accurate.cost))
         continue;
-      errors[1] = measure(scene, sets[1], diagonal);
-      const double cost = std::max(errors[0].cost, errors[1].cost);
+      const DialError seen = measure(scene, sets[1], diagonal);
+      const double cost = std::max(surface.cost, seen.cost);
       for (Choice* choice : {&balanced, &accurate}) {
-        if (cost >= choice->cost || !within(errors[0], choice->share) || !within(errors[1], choice->share))
-          continue;
+        if (cost >= choice->cost || !within(surface, choice->share) || !within(seen, choice->share)) continue;
         choice->cost = cost;
         choice->dial = h.quality[LSP_QUALITY_BALANCED];
       }
