@@ -195,7 +195,7 @@ class Filler {
     const std::span ends = std::span(ends_).subspan(sample * patches, patches);
     const glm::vec3& a = origins_[sample];
     if (raster_) {
-      raster_->cast(a, face, samples_[sample].out_x, samples_[sample].out_y, ends, t, records);
+      raster_->cast(a, face, samples_[sample].out_x, samples_[sample].out_y, ends, {t, records});
       return;
     }
     rays_.clear();

@@ -10,6 +10,12 @@
 
 namespace lsp {
 
+// By patch: where a ray meets something, in shares of the way between the sides, and what.
+struct RasterHits {
+  std::span<float> t;
+  std::span<uint32_t> records;
+};
+
 // Casts the rays from one point of a box's surface to a grid of points, one in each patch of another side.
 // They share their origin, so that a triangle is projected onto that side once and only the rays whose end
 // may lie in the projection are tested against it. A cast costs what the triangles of the box are, not the
@@ -29,21 +35,35 @@ class ShaftRaster {
 
   // `record` is what answers name the triangle by.
   void add(const LspTriangle& triangle, uint32_t record);
-  size_t size() const { return records_.size(); }
+  size_t size() const { return all_.records.size(); }
+
+  // Leaves out, until it is called again, what no ray from the rectangle with these corners, a part of
+  // another side, to `face` can hit: what is farther than `margin` from all of them.
+  void narrow(const glm::vec3& from_lo, const glm::vec3& from_hi, uint32_t face, float margin);
 
   // Casts the rays from `origin`, a point of another side, to `ends`, the points (x, y) in [0, 1)^2 of the
-  // patches of `face`. Spans have resolution^2 elements, by patch; t is in shares of the way between the
-  // sides, kMiss and LSP_NONE where nothing is hit.
+  // patches of `face`. Spans have resolution^2 elements, by patch. `first` is what a ray meets first, kMiss
+  // and LSP_NONE where it meets nothing; `last`, unless its spans are empty, what it meets last, 0 and
+  // LSP_NONE: the first of the same ray the other way round.
   void cast(const glm::vec3& origin, uint32_t face, float x, float y, std::span<const glm::vec3> ends,
-            std::span<float> t, std::span<uint32_t> records);
+            const RasterHits& first, RasterHits last = {});
 
  private:
+  // A triangle an element.
+  struct Triangles {
+    std::vector<float> corners[9];  // v0.x, v0.y, v0.z, v1.x, ...
+    std::vector<uint32_t> records;
+  };
+
   glm::vec3 lo_, hi_;
   uint32_t n_;
-  std::vector<float> corners_[9];  // v0.x, v0.y, v0.z, v1.x, ...
-  std::vector<uint32_t> records_;
+  Triangles all_, narrowed_;
+  bool narrow_ = false;
+  std::vector<uint8_t> outside_;      // by triangle
   std::vector<uint32_t> covered_;     // by triangle: the patches that its projection may cover
   std::vector<float> directions_[3];  // by patch
+  std::vector<float> last_t_;         // for those who do not ask for it
+  std::vector<uint32_t> last_records_;
 };
 
 }  // namespace lsp

@@ -83,8 +83,8 @@ TEST_P(ShaftRasters, HitWhatIsInTheWayFromEverySideToEverySide) {
 
   size_t hits = 0, doubtful = 0, rays = 0;
   std::vector<glm::vec3> ends(n * n);
-  std::vector<float> t(n * n);
-  std::vector<uint32_t> records(n * n);
+  std::vector<float> t(n * n), t_last(n * n);
+  std::vector<uint32_t> records(n * n), last(n * n);
   for (uint32_t in = 0; in < 6; ++in)
     for (uint32_t out = 0; out < 6; ++out) {
       if (in == out) continue;
@@ -98,7 +98,12 @@ TEST_P(ShaftRasters, HitWhatIsInTheWayFromEverySideToEverySide) {
           ends[q][u] = lo[u] + (hi[u] - lo[u]) * (float(q % n) + x) / float(n);
           ends[q][v] = lo[v] + (hi[v] - lo[v]) * (float(q / n) + y) / float(n);
         }
-        raster.cast(origin, out, x, y, ends, t, records);
+        // Of what may be hit from a part of the side, the same is hit.
+        const glm::vec3 part = half * (0.1f + float(k % 4));
+        glm::vec3 from_lo = glm::max(origin - part, lo), from_hi = glm::min(origin + part, hi);
+        from_lo[int(in / 2)] = from_hi[int(in / 2)] = origin[int(in / 2)];
+        raster.narrow(from_lo, from_hi, out, 1e-4f * c.scale);
+        raster.cast(origin, out, x, y, ends, {t, records}, {t_last, last});
         for (uint32_t q = 0; q < n * n; ++q) {
           const Answer expected =
               by_definition(triangles, glm::dvec3(origin), glm::dvec3(ends[q]) - glm::dvec3(origin));
@@ -111,6 +116,14 @@ TEST_P(ShaftRasters, HitWhatIsInTheWayFromEverySideToEverySide) {
           ASSERT_EQ(records[q], expected.record) << "from side " << in << " to patch " << q << " of side "
                                                  << out << ", t " << t[q] << " and " << expected.t;
           ASSERT_NEAR(t[q], expected.t, 1e-4);
+          // The last is the first of the ray the other way round.
+          const Answer back =
+              by_definition(triangles, glm::dvec3(ends[q]), glm::dvec3(origin) - glm::dvec3(ends[q]));
+          if (back.doubtful || back.t > 1 - 3e-4 || t_last[q] > 1 - 3e-4f) continue;
+          ASSERT_EQ(last[q], back.record) << "to side " << in << " from patch " << q << " of side " << out;
+          if (last[q] != LSP_NONE) {
+            ASSERT_NEAR(1 - t_last[q], back.t, 1e-4);
+          }
         }
       }
     }
@@ -133,7 +146,7 @@ TEST(ShaftRaster, OfEqualHitsTakesTheSmallestRecord) {
     const std::vector<glm::vec3> ends = {{0, 0, 1}};
     std::vector<float> t(1);
     std::vector<uint32_t> records(1);
-    raster.cast({0, 0, -1}, 5, 0.5f, 0.5f, ends, t, records);
+    raster.cast({0, 0, -1}, 5, 0.5f, 0.5f, ends, {t, records});
     EXPECT_EQ(records[0], 5u);
     EXPECT_EQ(t[0], 0.5f);
   }

@@ -17,12 +17,16 @@ constexpr uint32_t kNoPlane = UINT32_MAX;
 constexpr int kPlaces =
     5;  // coordinates of a ray's place in a shaft of an origin table; a far table has four
 
-// A ray of a shaft and what it truly meets. t counts in shares of its way through the cell.
-struct ShaftSample {
-  std::array<float, kPlaces> place;  // in [-1, 1] each
-  glm::vec3 origin, way;             // from the cell's centre; way: to where it leaves the cell
-  float t;                           // of what it meets
-  uint32_t plane;                    // of what it meets, kNoPlane: nothing in the cell
+// Rays of a shaft and what they truly meet, each an array by ray. `t` counts in shares of the way through the
+// cell. Those of the shaft the other way round are the same lines, `reversed`: then only t, plane and the
+// order of the places are the reversed ray's.
+struct ShaftSamples {
+  size_t count = 0;
+  std::array<const float*, kPlaces> place{};    // in [-1, 1] each; null: always 0
+  std::array<const float*, 3> origin{}, way{};  // from the cell's centre; way: to where it leaves the cell
+  const float* t = nullptr;                     // of what it meets
+  const uint32_t* plane = nullptr;              // of what it meets, kNoPlane: nothing in the cell
+  bool reversed = false;
 };
 
 struct Plane {
@@ -46,33 +50,32 @@ struct FitOptions {
 
 constexpr int kSplitWeight = 31;
 
-// Chooses for `samples`, every fourth of which (of 24 and more) only measures. `near` where rays begin in the
+// Chooses for samples, every fourth of which (of 24 and more) only measures. `near` where rays begin in the
 // cell: then nothing behind the origin counts.
 class AnswerFit {
  public:
   AnswerFit(const FitOptions& options, float cell_size) : options_(options), size_(cell_size) {}
 
-  Answer choose(std::span<const Plane> planes, std::span<const ShaftSample> samples, bool near);
+  Answer choose(std::span<const Plane> planes, const ShaftSamples& samples, bool near);
 
  private:
-  float loss(std::span<const Plane> planes, const ShaftSample& s, uint32_t plane, bool near) const;
-  bool fit_split(std::span<const ShaftSample> samples, const float* first, const float* second,
-                 Answer& answer, float& cost) const;
-  bool measures_only(size_t sample) const { return held_out_ && sample % 4 == 3; }
+  // Of all samples, or of those that choose and those that only measure.
+  struct Sums {
+    float training = 0, held = 0;
+  };
+  Sums sums(const float* losses) const;
+  void add_candidates(std::span<const Plane> planes, bool near);
+  float fit_split(const float* first, const float* second, Answer& answer);
+  void chosen(const std::array<int8_t, kPlaces + 1>& weights, const float* first, const float* second);
 
   FitOptions options_;
   float size_;
+  const ShaftSamples* samples_ = nullptr;
+  size_t count_ = 0, stride_ = 0;
   bool held_out_ = false;
   std::vector<uint32_t> candidates_;
   std::vector<float> losses_;  // by candidate and sample
+  std::vector<float> chosen_;  // of a split that is tried, by sample
 };
-
-// The linear form of a split at a place.
-inline float split_side(const std::array<int8_t, kPlaces + 1>& weights,
-                        const std::array<float, kPlaces>& place) {
-  float side = float(weights[kPlaces]);
-  for (int k = 0; k < kPlaces; ++k) side += float(weights[size_t(k)]) * place[size_t(k)];
-  return side;
-}
 
 }  // namespace lsp

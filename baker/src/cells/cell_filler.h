@@ -1,14 +1,10 @@
 // Fills the tables of one cell.
 #pragma once
 
-#include <optional>
-#include <unordered_map>
-
 #include "answer_fit.h"
 #include "cell_tables.h"
 #include "cell_tree.h"
 #include "lsp/lsp.h"
-#include "shaft_raster.h"
 
 namespace lsp {
 

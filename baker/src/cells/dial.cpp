@@ -90,6 +90,37 @@ bool within(const DialError& e, double share) {
   return e.wrong <= 0.01 * share && e.depth <= 0.01 * share && e.picture <= 0.03 * share;
 }
 
+// The cheapest dial that keeps within a share of the errors that balanced may have. The more of the origin
+// tables is heeded, the less of the far tables can be: a walk along the border of what is within. Tries dials
+// in the header's `balanced`.
+uint32_t cheapest(const lsp_scene& scene, LspHeader& header, const std::array<Rays, 2>& sets, double diagonal,
+                  double share) {
+  constexpr uint32_t kClasses[] = {0, 1, 2, 3, 4, 5, 6, LSP_LOSS_UNKNOWN + 1};
+  uint32_t best = LSP_DIAL(0u, 0u);
+  double least = INFINITY;
+  for (size_t near = 0, far = std::size(kClasses); near < std::size(kClasses) && far > 0;) {
+    const uint32_t dial = LSP_DIAL(kClasses[near], kClasses[far - 1]);
+    header.quality[LSP_QUALITY_BALANCED] = dial;
+    double cost = 0;
+    bool kept = true;
+    for (const Rays& set : sets) {
+      const DialError error = measure(scene, set, diagonal);
+      cost = std::max(cost, error.cost);
+      kept = kept && within(error, share);
+      if (!kept) break;
+    }
+    if (kept && cost < least) {
+      least = cost;
+      best = dial;
+    }
+    if (kept)
+      ++near;
+    else
+      --far;
+  }
+  return best;
+}
+
 }  // namespace
 
 void choose_dial(Baked& baked) {
@@ -105,30 +136,9 @@ void choose_dial(Baked& baked) {
   lsp_trace_counts ignored{};
   for (Rays& set : sets) set.truth = trace(scene, {0, 0, 0, 0}, set.rays, &ignored);
 
-  constexpr uint32_t kClasses[] = {0, 1, 2, 3, 4, 5, 6, LSP_LOSS_UNKNOWN + 1};
-  struct Choice {
-    double share;  // of the errors that balanced may have
-    uint32_t dial = LSP_DIAL(0u, 0u);
-    double cost = INFINITY;
-  };
-  Choice balanced{1}, accurate{0.5};
-  for (uint32_t near : kClasses)
-    for (uint32_t far : kClasses) {
-      h.quality[LSP_QUALITY_BALANCED] = LSP_DIAL(near, far);
-      const DialError surface = measure(scene, sets[0], diagonal);
-      // What no choice can take is not measured further.
-      if (!within(surface, balanced.share) || surface.cost >= std::max(balanced.cost, accurate.cost))
-        continue;
-      const DialError seen = measure(scene, sets[1], diagonal);
-      const double cost = std::max(surface.cost, seen.cost);
-      for (Choice* choice : {&balanced, &accurate}) {
-        if (cost >= choice->cost || !within(surface, choice->share) || !within(seen, choice->share)) continue;
-        choice->cost = cost;
-        choice->dial = h.quality[LSP_QUALITY_BALANCED];
-      }
-    }
-  h.quality[LSP_QUALITY_BALANCED] = balanced.dial;
-  h.quality[LSP_QUALITY_ACCURATE] = accurate.dial;
+  const uint32_t accurate = cheapest(scene, h, sets, diagonal, 0.5);
+  h.quality[LSP_QUALITY_BALANCED] = cheapest(scene, h, sets, diagonal, 1);
+  h.quality[LSP_QUALITY_ACCURATE] = accurate;
 }
 
 }  // namespace lsp
