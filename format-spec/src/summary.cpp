@@ -2,6 +2,7 @@
 
 #include <lsp/program.h>
 
+#include <array>
 #include <bit>
 #include <cstdarg>
 #include <cstdio>
@@ -22,11 +23,16 @@ Json feature_names(uint32_t features) {
     const char* name;
   } kNames[] = {{LSP_FEATURE_EXACT, "exact"},     {LSP_FEATURE_LINE_SPACES, "line spaces"},
                 {LSP_FEATURE_NORMALS, "normals"}, {LSP_FEATURE_MATERIALS, "materials"},
-                {LSP_FEATURE_NTREE, "ntree"},     {LSP_FEATURE_BINARY, "binary"}};
+                {LSP_FEATURE_NTREE, "ntree"},     {LSP_FEATURE_BINARY, "binary"},
+                {LSP_FEATURE_CELLS, "cells"}};
   Json names = Json::array();
   for (const auto& feature : kNames)
     if (features & feature.bit) names.push_back(feature.name);
   return names;
+}
+
+const char* base_name(uint32_t base) {
+  return base == LSP_BASE_NTREE ? "ntree" : base == LSP_BASE_CELLS ? "cells" : "bvh";
 }
 
 Json sections(const FileView& view) {
@@ -157,6 +163,46 @@ Json line_spaces(const FileView& view) {
 
 Json vec(const lsp_float3& v) { return Json::array({v.x, v.y, v.z}); }
 
+constexpr int kLossLimits[] = LSP_LOSS_LIMITS;
+
+// From which loss on, per cent, a dial has a cell traced exactly: null where it never does. 0: always.
+Json heeded_loss(uint32_t classes) {
+  if (classes > LSP_LOSS_UNKNOWN) return nullptr;
+  return classes == 0 ? 0 : kLossLimits[classes - 1];
+}
+
+Json cells(const FileView& view) {
+  const LspHeader& h = view.header;
+  const LspCellGrid& g = h.cells;
+  Json json = {{"grid", {g.cells_x, g.cells_y, g.cells_z}},
+               {"lo", vec(g.lo)},
+               {"size", g.size},
+               {"margin", g.margin},
+               {"filled", h.filled_cell_count},
+               {"far_patches", g.far_patches},
+               {"origin_patches", g.origin_patches},
+               {"sub_cells", g.sub_cells},
+               {"planes", h.plane_count},
+               {"splits", h.split_count}};
+  constexpr const char* kNames[LSP_QUALITY_COUNT] = {"balanced", "fast", "accurate"};
+  for (uint32_t q = 0; q < LSP_QUALITY_COUNT; ++q)
+    json["exact_above_loss"][kNames[q]] = {{"origin", heeded_loss(h.quality[q] & 0xFF)},
+                                           {"far", heeded_loss(h.quality[q] >> 8)}};
+  // How many entries lose so much: by class, of the two tables.
+  std::array<std::array<uint64_t, LSP_LOSS_UNKNOWN + 1>, 2> counts{};
+  uint64_t entry = 0;
+  for (const uint32_t word : view.elements<uint32_t>(Kind::kCent))
+    for (const uint32_t e : {word & 0xFFFF, word >> 16}) {
+      const bool origin = entry++ >= g.origin_entry_first;
+      ++counts[origin ? 0 : 1][e >> LSP_LOSS_SHIFT];
+    }
+  for (size_t table = 0; table < 2; ++table)
+    for (uint32_t c = 0; c <= LSP_LOSS_UNKNOWN; ++c)
+      json["entries"][table == 0 ? "origin" : "far"]
+          [c == LSP_LOSS_UNKNOWN ? "unknown" : std::to_string(kLossLimits[c])] = counts[table][c];
+  return json;
+}
+
 std::string line(const char* format, ...) __attribute__((format(printf, 1, 2)));
 std::string line(const char* format, ...) {
   char text[256];
@@ -173,6 +219,27 @@ std::string section_line(const Json& s) {
               s["bytes"].get<unsigned long long>(),
               s["codec"].is_string() ? s["codec"].get<std::string>().c_str() : "?",
               s["element_bytes"].get<unsigned>(), s["element_count"].get<unsigned long long>());
+}
+
+std::string cells_text(const Json& c) {
+  const Json& grid = c["grid"];
+  std::string text =
+      line("cells %u x %u x %u, %u of them filled, N %u, M %u, %u^3 sub-cells; %u planes, %u splits\n",
+           grid[0].get<unsigned>(), grid[1].get<unsigned>(), grid[2].get<unsigned>(),
+           c["filled"].get<unsigned>(), c["far_patches"].get<unsigned>(), c["origin_patches"].get<unsigned>(),
+           c["sub_cells"].get<unsigned>(), c["planes"].get<unsigned>(), c["splits"].get<unsigned>());
+  text += "\n  traced exactly    origin entries       far entries\n";
+  const auto from = [](const Json& loss) {
+    return loss.is_null() ? std::string("never") : "loss > " + std::to_string(loss.get<int>()) + " %";
+  };
+  for (const auto& [quality, above] : c["exact_above_loss"].items())
+    text += line("  %-12s %19s %17s\n", quality.c_str(), from(above["origin"]).c_str(),
+                 from(above["far"]).c_str());
+  text += "\n  loss up to    origin entries       far entries\n";
+  for (const auto& [loss, count] : c["entries"]["origin"].items())
+    text += line("  %9s%s %16llu %17llu\n", loss.c_str(), loss == "unknown" ? "  " : " %",
+                 count.get<unsigned long long>(), c["entries"]["far"][loss].get<unsigned long long>());
+  return text;
 }
 
 }  // namespace
@@ -198,7 +265,7 @@ Json summarize(std::span<const std::byte> file, const std::string& name, uint64_
   json["content_id"] = to_hex({header.content_hash_lo, header.content_hash_hi});
   json["source_id"] = to_hex({header.source_hash_lo, header.source_hash_hi});
   json["features"] = feature_names(header.required_features);
-  json["base"] = header.base_structure == LSP_BASE_NTREE ? "ntree" : "bvh";
+  json["base"] = base_name(header.base_structure);
   json["packed"] = view.any_packed();
   json["parameters"] = {
       {"resolution", header.resolution},           {"depth", header.line_space_depth},
@@ -216,6 +283,7 @@ Json summarize(std::span<const std::byte> file, const std::string& name, uint64_
   if (is_ntree(header))
     json["ntree"] = {
         {"lo", vec(header.ntree_lo)}, {"size", header.ntree_size}, {"margin", header.ntree_margin}};
+  if (header.base_structure == LSP_BASE_CELLS) json["cells"] = cells(view);
   json["limits"] = {{"max_depth", header.max_depth},
                     {"max_stack", header.max_stack},
                     {"max_steps", header.max_steps},
@@ -278,6 +346,7 @@ std::string summary_text(const Json& j, const std::string& section) {
                  p["ntree_branching"].get<unsigned>(), p["ntree_depth"].get<unsigned>(),
                  c["cells"].get<unsigned long long>(), c["references"].get<unsigned long long>(),
                  ratio(c["references"].get<uint64_t>(), c["triangles"].get<uint64_t>()));
+  if (j.contains("cells")) text += cells_text(j["cells"]);
   text += "\n" + head;
   for (const Json& s : j["sections"]) text += section_line(s);
   text += line("  padding %25llu\n", j["padding_bytes"].get<unsigned long long>());

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "annotate.h"
+#include "cells_scenes.h"
 #include "mutations.h"
 #include "mutator.h"
 #include "ntree_scenes.h"
@@ -84,6 +85,20 @@ TEST(Info, CountsOfTheTreeAddUp) {
     EXPECT_EQ(json["findings"], 0) << file.name;
     EXPECT_FALSE(summary_text(json, "").empty());
   }
+}
+
+TEST(Info, SaysWhatCellsAre) {
+  const Image scene = full_cells_scene();
+  const auto json = summarize(encode(scene), "cells", uint64_t{1} << 26);
+  EXPECT_EQ(json["base"], "cells");
+  EXPECT_EQ(json["features"].back(), "cells");
+  const auto& cells = json["cells"];
+  EXPECT_EQ(cells["grid"][0], scene.header.cells.cells_x);
+  uint64_t entries = 0;
+  for (const char* table : {"origin", "far"})
+    for (const auto& [loss, count] : cells["entries"][table].items()) entries += count.get<uint64_t>();
+  EXPECT_EQ(entries, 2 * scene.entries.size());
+  EXPECT_TRUE(cells["exact_above_loss"]["fast"]["far"].is_null());
 }
 
 TEST(Info, SummarisesDamagedFiles) {
