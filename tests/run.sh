@@ -20,13 +20,13 @@ while [ $# -gt 0 ]; do
 done
 
 started=$SECONDS
-# What only the tests need, where nothing of the kind is there: the second reader runs on Node.js, the fuzzers
-# are built with Clang.
-extra=()
+# What only the tests need: a project is built with Make. And where nothing of the kind is there: the second reader
+# runs on Node.js, the fuzzers are built with Clang.
+extra=(make)
 command -v npm >/dev/null || extra+=(nodejs npm)
 command -v clang++-14 >/dev/null || extra+=(clang-14)
 compgen -G '/usr/lib/llvm-14/lib/clang/*/lib/linux/libclang_rt.fuzzer-*.a' >/dev/null || extra+=(libclang-rt-14-dev)
-./samples/setup.sh ${extra[@]+"${extra[@]}"}
+./samples/setup.sh "${extra[@]}"
 
 # ccache makes the second run short; without it everything still builds.
 launcher=()

@@ -30,6 +30,7 @@ configure_package_config_file(cmake/lspConfig.cmake.in ${CMAKE_CURRENT_BINARY_DI
   INSTALL_DESTINATION ${package_dir} PATH_VARS CMAKE_INSTALL_INCLUDEDIR)
 write_basic_package_version_file(${CMAKE_CURRENT_BINARY_DIR}/lspConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/lspConfig.cmake ${CMAKE_CURRENT_BINARY_DIR}/lspConfigVersion.cmake
+  cmake/lspAddAsset.cmake
   DESTINATION ${package_dir} COMPONENT runtime)
 
 set(LSP_PC_CFLAGS "")
@@ -52,12 +53,18 @@ install(CODE "
   message(STATUS \"Installing: \$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_LIBDIR}/pkgconfig/lsp.pc\")
 " COMPONENT runtime)
 
-# The programs are made in folders that come later.
+# The programs are made in folders that come later. Their targets are a file of their own, for lspConfig.cmake to find
+# where they are installed.
 function(lsp_install_programs)
-  foreach(program lsp-bake lsp-validate lsp-info lsp-trace lsp-render lsp-compare lsp-bench)
+  set(programs)
+  foreach(program ${LSP_PROGRAM_TARGETS})
     if(TARGET ${program})
-      install(TARGETS ${program} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT programs)
+      list(APPEND programs ${program})
     endif()
   endforeach()
+  if(programs)
+    install(TARGETS ${programs} EXPORT lspPrograms RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT programs)
+    install(EXPORT lspPrograms NAMESPACE lsp:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/lsp COMPONENT programs)
+  endif()
 endfunction()
 cmake_language(DEFER DIRECTORY ${PROJECT_SOURCE_DIR} CALL lsp_install_programs)

@@ -51,6 +51,10 @@ step(${WORK_DIR}/by_pkg_config ${corpus}/full.lsp)
 if(LINKAGE STREQUAL "static")
   step(${CMAKE_COMMAND} -S ${CONSUMER_DIR} -B ${WORK_DIR}/all -G Ninja -DCMAKE_C_COMPILER=${C_COMPILER}
     -DCMAKE_CXX_COMPILER=${CXX_COMPILER} -DLSP_BY=subdirectory -DLSP_SOURCE_DIR=${SOURCE_DIR} -DLSP_PROGRAMS=ON -DLSP_TESTS=ON)
+  execute_process(COMMAND ninja -C ${WORK_DIR}/all -t query corner.lsp OUTPUT_VARIABLE inputs COMMAND_ERROR_IS_FATAL ANY)
+  if(NOT inputs MATCHES "/lsp-bake\n")
+    message(FATAL_ERROR "an asset does not wait for lsp-bake:\n${inputs}")
+  endif()
 endif()
 
 # What the headers mark, and nothing else, is what the shared libraries give out.
