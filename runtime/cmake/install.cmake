@@ -1,4 +1,5 @@
-# What cmake --install puts where: component `runtime` is the library for engines, `programs` the programs.
+# What cmake --install puts where. Components: `development` is what an engine builds with, `runtime` the shared
+# libraries that it then runs with (none where they are static), `programs` the programs.
 include(CMakePackageConfigHelpers)
 set(LSP_CONFIG_NEEDS_ZSTD OFF)
 if(LSP_PACKED AND NOT BUILD_SHARED_LIBS)
@@ -17,21 +18,21 @@ list(TRANSFORM headers PREPEND include/lsp/)
 list(TRANSFORM shader_include PREPEND include/lsp/)
 
 install(TARGETS ${libraries} EXPORT lspTargets
-  ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT runtime
-  LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT runtime)
-install(EXPORT lspTargets NAMESPACE lsp:: DESTINATION ${package_dir} COMPONENT runtime)
+  ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT development
+  LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT runtime NAMELINK_COMPONENT development)
+install(EXPORT lspTargets NAMESPACE lsp:: DESTINATION ${package_dir} COMPONENT development)
 install(FILES
   ${PROJECT_SOURCE_DIR}/format-spec/include/lsp/layout.h ${PROJECT_SOURCE_DIR}/format-spec/include/lsp/sections.def
   ${PROJECT_SOURCE_DIR}/format-spec/include/lsp/program.h
   ${headers} ${shader_include}
-  DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/lsp COMPONENT runtime)
+  DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/lsp COMPONENT development)
 
 configure_package_config_file(cmake/lspConfig.cmake.in ${CMAKE_CURRENT_BINARY_DIR}/lspConfig.cmake
   INSTALL_DESTINATION ${package_dir} PATH_VARS CMAKE_INSTALL_INCLUDEDIR)
 write_basic_package_version_file(${CMAKE_CURRENT_BINARY_DIR}/lspConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/lspConfig.cmake ${CMAKE_CURRENT_BINARY_DIR}/lspConfigVersion.cmake
   cmake/lspAddAsset.cmake
-  DESTINATION ${package_dir} COMPONENT runtime)
+  DESTINATION ${package_dir} COMPONENT development)
 
 set(LSP_PC_CFLAGS "")
 if(NOT BUILD_SHARED_LIBS)
@@ -44,14 +45,11 @@ endif()
 if(LSP_PACKED AND NOT BUILD_SHARED_LIBS)
   set(LSP_PC_REQUIRES "libzstd")
 endif()
-# The prefix is known only when installing (cmake --install --prefix), so the file is written then.
-configure_file(cmake/lsp.pc.in ${CMAKE_CURRENT_BINARY_DIR}/lsp.pc.in @ONLY)
-install(CODE "
-  file(READ \"${CMAKE_CURRENT_BINARY_DIR}/lsp.pc.in\" text)
-  string(REGEX REPLACE \"^prefix=[^\\n]*\" \"prefix=\${CMAKE_INSTALL_PREFIX}\" text \"\${text}\")
-  file(WRITE \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_LIBDIR}/pkgconfig/lsp.pc\" \"\${text}\")
-  message(STATUS \"Installing: \$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_LIBDIR}/pkgconfig/lsp.pc\")
-" COMPONENT runtime)
+# By its own place the file knows the prefix, which may be moved.
+file(RELATIVE_PATH up ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig ${CMAKE_INSTALL_PREFIX})
+string(REGEX REPLACE "/$" "" LSP_PC_PREFIX "\${pcfiledir}/${up}")
+configure_file(cmake/lsp.pc.in ${CMAKE_CURRENT_BINARY_DIR}/lsp.pc @ONLY)
+install(FILES ${CMAKE_CURRENT_BINARY_DIR}/lsp.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT development)
 
 # The programs are made in folders that come later. Their targets are a file of their own, for lspConfig.cmake to find
 # where they are installed.

@@ -22,8 +22,9 @@ configure_file(${SOURCE_DIR}/samples/images/atrium.jpg "${project}/my scene/wall
 set(build ${WORK_DIR}/build)
 set(options -G ${GENERATOR} -DLSP_BY=${LSP_BY})
 if(LSP_BY STREQUAL "package")
-  step(${CMAKE_COMMAND} --install ${BUILD_DIR} --component runtime --prefix ${WORK_DIR}/prefix)
-  step(${CMAKE_COMMAND} --install ${BUILD_DIR} --component programs --prefix ${WORK_DIR}/prefix)
+  foreach(component runtime development programs)
+    step(${CMAKE_COMMAND} --install ${BUILD_DIR} --component ${component} --prefix ${WORK_DIR}/prefix)
+  endforeach()
   list(APPEND options -DCMAKE_PREFIX_PATH=${WORK_DIR}/prefix)
 else()
   list(APPEND options -DLSP_SOURCE_DIR=${SOURCE_DIR} -DLSP_BAKE=${LSP_BAKE} -DCMAKE_C_COMPILER=${C_COMPILER}
