@@ -408,11 +408,12 @@ int main(int argc, char** argv) {
   app.add_option("--levels", a.levels, "NTree: levels of nodes")->check(CLI::Range(1u, LSP_MAX_NTREE_DEPTH));
   app.add_option(
          "--preset", a.preset,
-         "Speed against accuracy, where --resolution, --depth or --samples do not say; of cells: the time of "
-         "the bake against the exact work that their qualities need")
+         "Fast to bake and to trace, or accurate; --resolution, --depth and --samples overrule it. Of cells: "
+         "the time of the bake against the exact work that their qualities need")
       ->check(CLI::IsMember({"fast", "balanced", "accurate"}));
   app.add_option("--max-error", a.max_error,
-                 "Choose the cheapest setting with at most this many per cent of rays answered wrongly")
+                 "Choose the cheapest setting with at most this many per cent of rays answered wrongly; "
+                 "0: as --preset says")
       ->check(CLI::Range(0.0, 100.0));
   auto* resolution =
       app.add_option("--resolution", a.resolution, "N: patches along an edge of a Line Space's box")
@@ -428,7 +429,7 @@ int main(int argc, char** argv) {
       app.add_option("--samples", a.samples,
                      "Rays that choose a shaft's candidate; 1: the centroid ray alone, as the paper does")
           ->check(CLI::Range(1u, 64u));
-  app.add_option("--for", a.purpose, "What the file is for")
+  app.add_option("--for", a.purpose, "What the file is for: what nobody needs then is left out")
       ->transform(CLI::CheckedTransformer(std::map<std::string, Purpose>{{"visibility", Purpose::kVisibility},
                                                                          {"ao", Purpose::kAo},
                                                                          {"diffuse", Purpose::kDiffuse},
@@ -446,7 +447,9 @@ int main(int argc, char** argv) {
   app.add_flag("--exact", a.exact, "Keep the exact tree below the Line Spaces (the default)");
   app.add_flag("--no-exact", a.no_exact, "Keep only what approximate rays need");
   app.add_flag("--no-line-spaces", a.no_line_spaces, "Bake the exact tree alone");
-  app.add_option("--compress", a.compress, "Pack the sections")->check(CLI::IsMember({"none", "zstd"}));
+  app.add_option("--compress", a.compress,
+                 "Pack the sections: a smaller file, which is unpacked into memory and not mapped")
+      ->check(CLI::IsMember({"none", "zstd"}));
   app.add_option("--align", a.align, "Alignment of sections in bytes")
       ->check(CLI::IsMember({256, 4096, 65536}));
   app.add_option("--threads", a.threads, "Threads, 0: all cores");
@@ -469,6 +472,16 @@ int main(int argc, char** argv) {
                  "Write a rule for Make and Ninja: OUT.lsp: every file that was read");
   app.add_flag("--no-splits", a.no_splits, "Build the tree without spatial splits");
   add_common_options(app, "lsp-bake", a.common);
+  arrange_help(app, "lsp-bake room.gltf -o room.lsp --preset fast",
+               {{"What most people need",
+                 {"INPUT", "--output FILE", "--preset", "--max-error PERCENT", "--for", "--compress"}},
+                {"Base structure", {"--base", "--cells", "--branching", "--levels", "--no-splits"}},
+                {"Line Spaces",
+                 {"--resolution", "--depth", "--triangles", "--samples", "--normal-angle DEGREES",
+                  "--plane-tolerance", "--no-line-spaces", "--exact", "--no-exact"}},
+                {"Line Spaces of --for visibility", {"--conservative", "--directed"}},
+                {"What is read", {"--crease-angle DEGREES", "--strict", "--depfile FILE"}},
+                {"The machine and the file", {"--threads", "--memory-limit", "--align"}}});
   return run_program("lsp-bake", app, argc, argv, [&] {
     a.resolution_given = resolution->count() > 0;
     a.depth_given = depth->count() > 0;

@@ -79,5 +79,7 @@ int main(int argc, char** argv) {
                  "For the sections of a packed file, as in 512MB or 8GB")
       ->transform(CLI::AsSizeValue(false));
   add_common_options(app, "lsp-info", common);
+  arrange_help(app, "lsp-info room.lsp --annotate",
+               {{"Options", {"FILE.lsp", "--annotate", "--section NAME", "--memory-limit"}}});
   return run_program("lsp-info", app, argc, argv, [&] { return show(arguments, common); });
 }

@@ -102,5 +102,8 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_flag("--rules", arguments.rules, "Print the rule catalogue as Markdown and end");
   add_common_options(app, "lsp-validate", common);
+  arrange_help(
+      app, "lsp-validate room.lsp",
+      {{"Options", {"FILE.lsp", "--level", "--mesh MESH...", "--examples", "--memory-limit", "--rules"}}});
   return run_program("lsp-validate", app, argc, argv, [&] { return validate(arguments, common); });
 }

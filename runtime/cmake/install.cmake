@@ -51,13 +51,35 @@ string(REGEX REPLACE "/$" "" LSP_PC_PREFIX "\${pcfiledir}/${up}")
 configure_file(cmake/lsp.pc.in ${CMAKE_CURRENT_BINARY_DIR}/lsp.pc @ONLY)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/lsp.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT development)
 
+# Manual pages are what --help says, where help2man is there to make them.
+find_program(LSP_HELP2MAN help2man DOC "Makes manual pages of --help; without it there are none")
+function(lsp_install_manual program does)
+  set(page ${PROJECT_BINARY_DIR}/man/${program}.1)
+  add_custom_command(OUTPUT ${page} VERBATIM
+    COMMAND ${LSP_HELP2MAN} --no-info --name ${does} --source "lsp ${PROJECT_VERSION}" --manual lsp --output ${page}
+            $<TARGET_FILE:${program}>
+    DEPENDS ${program})
+  add_custom_target(${program}-manual ALL DEPENDS ${page})
+  install(FILES ${page} DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT programs)
+endfunction()
+
 # The programs are made in folders that come later. Their targets are a file of their own, for lspConfig.cmake to find
 # where they are installed.
 function(lsp_install_programs)
+  set(does_lsp-bake "turn meshes into .lsp files")
+  set(does_lsp-validate "check .lsp files")
+  set(does_lsp-info "show what an .lsp file holds")
+  set(does_lsp-trace "trace rays in an .lsp file")
+  set(does_lsp-render "render an .lsp file")
+  set(does_lsp-compare "compare two pictures")
+  set(does_lsp-bench "measure run time against error")
   set(programs)
   foreach(program ${LSP_PROGRAM_TARGETS})
     if(TARGET ${program})
       list(APPEND programs ${program})
+      if(LSP_HELP2MAN AND NOT CMAKE_CROSSCOMPILING)
+        lsp_install_manual(${program} ${does_${program}})
+      endif()
     endif()
   endforeach()
   if(programs)

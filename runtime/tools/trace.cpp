@@ -57,6 +57,12 @@ void define(CLI::App& app, Options& options) {
                  "Part of the Vulkan device's name; without it a GPU if there is one");
   app.add_option("--load", options.load_path, "How the scene gets to the Vulkan device")
       ->check(CLI::IsMember({"automatic", "import", "upload"}));
+  arrange_help(app, "lsp-trace room.lsp --rays rays.bin --hits hits.bin --json",
+               {{"What most people need",
+                 {"FILE.lsp", "--rays FILE", "--hits FILE", "--mode", "--query", "--backend"}},
+                {"Approximate mode", {"--near", "--lod", "--quality", "--max-loss PERCENT"}},
+                {"Exact mode", {"--skip-empty"}},
+                {"The machine", {"--repeat", "--threads", "--device NAME", "--load"}}});
 }
 
 double median(std::vector<double> values) {

@@ -210,5 +210,13 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember({"cpu", "vulkan"}));
   app.add_option("--threads", a.options.threads, "Threads of the CPU (default: all)")
       ->check(CLI::Range(1, 1024));
+  arrange_help(
+      app, "lsp-render room.lsp -o room.png --effect diffuse --mode approximate",
+      {{"What most people need",
+        {"FILE.lsp", "--output FILE", "--effect", "--mode", "--camera EYE:TARGET:ANGLE", "--samples"}},
+       {"The picture", {"--size WxH", "--exposure STOPS", "--denoise"}},
+       {"Light", {"--bounces", "--ao-distance", "--sun X,Y,Z"}},
+       {"Approximate mode", {"--near", "--lod", "--quality", "--max-loss PERCENT"}},
+       {"The machine", {"--backend", "--threads"}}});
   return run_program(kProgram, app, argc, argv, [&] { run(a, common, kProgram); });
 }

@@ -10,6 +10,7 @@
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <thread>
 
 namespace lsp::test {
@@ -68,6 +69,19 @@ TEST_F(LspBake, PresetsOfCellsDiffer) {
   for (const std::string preset : {"fast", "accurate"})
     ASSERT_EQ(run("small.obj --base cells --cells 4 --preset " + preset + " -o " + preset + ".lsp"), 0);
   EXPECT_FALSE(read("fast.lsp") == read("accurate.lsp"));
+}
+
+TEST_F(LspBake, HelpBeginsWithWhatMostPeopleNeed) {
+  ASSERT_EQ(run("--help"), 0);
+  const std::string help = read("out");
+  const size_t first = help.find("\nWhat most people need:\n"), second = help.find(":\n", first + 30);
+  ASSERT_NE(second, std::string::npos);
+  for (const char* option : {"INPUT...", "-o, --output FILE", "--preset fast|balanced|accurate",
+                             "--max-error PERCENT", "--for ", "--compress none|zstd"})
+    EXPECT_LT(help.find("\n  " + std::string(option)), second) << help;
+  EXPECT_EQ(help.find("More options"), std::string::npos) << "an option has no group";
+  std::istringstream lines(help);
+  for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 80u) << line;
 }
 
 TEST_F(LspBake, PrintsOneJsonObject) {

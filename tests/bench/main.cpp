@@ -223,5 +223,9 @@ int main(int argc, char** argv) {
   app.add_flag("--no-vulkan", arguments.no_vulkan, "Measure the CPU only");
   app.add_option("--threads", arguments.threads, "What 'all threads' means (default: all)")
       ->check(CLI::Range(1, 1024));
+  arrange_help(app, "lsp-bench room.gltf -o report --quick",
+               {{"What most people need",
+                 {"SCENE", "--output FOLDER", "--suite", "--quick", "--no-vulkan", "--threads"}},
+                {"What takes long", {"--large"}}});
   return run_program("lsp-bench", app, argc, argv, [&] { bench::run(arguments, common); });
 }

@@ -69,9 +69,13 @@ for file in "$root"/usr/bin/* $(find "$root/usr/lib" -name '*.so.*' -type f); do
   if ldd "$file" | grep -E 'liblsp|not found' | grep -v "$root"; then fail "$file does not find its library"; fi
 done
 if has lsp-tools; then
+  manuals=$(grep -c 'LSP_HELP2MAN:FILEPATH=/' "$build/CMakeCache.txt" || true)
   for name in bake validate info trace render compare; do
     program=$root/usr/bin/lsp-$name
     "$program" --version >/dev/null || fail "$program does not start"
+    "$program" --help >help.txt
+    grep -nE '.{81}|TEXT|:\{|More options' help.txt && fail "$program --help is not fit to read"
+    [ "$manuals" = 0 ] || [ -s "$root/usr/share/man/man1/lsp-$name.1" ] || fail "$program has no manual page"
   done
   "$root/usr/bin/lsp-info" --version
   "$root/usr/bin/lsp-info" --quiet "$source/format-spec/corpus/2.0/valid/full.lsp"

@@ -13,6 +13,7 @@
 #include <string_view>
 #include <type_traits>
 
+#include "lsp/help_text.h"
 #include "lsp/layout.h"
 #include "lsp/program.h"
 
@@ -23,11 +24,15 @@ struct CommonOptions {
   bool json = false;   // one JSON object on standard output and nothing else there
 };
 
-// Adds --version, --quiet and --json.
+// Adds --version, --quiet and --json, and gives --help its form.
 inline void add_common_options(CLI::App& app, const char* program, CommonOptions& options) {
-  app.set_version_flag("--version", std::string(program) + " " + kProgramVersion + ", format " +
-                                        std::to_string(LSP_VERSION_MAJOR) + "." +
-                                        std::to_string(LSP_VERSION_MINOR));
+  app.name(program);
+  app.formatter(std::make_shared<HelpText>());
+  app.set_help_flag("-h,--help", "Print this and exit");
+  app.set_version_flag("--version",
+                       std::string(program) + " " + kProgramVersion + ", format " +
+                           std::to_string(LSP_VERSION_MAJOR) + "." + std::to_string(LSP_VERSION_MINOR),
+                       "Print the versions of program and format and exit");
   app.add_flag("--quiet", options.quiet, "Print nothing but errors");
   app.add_flag("--json", options.json, "Print one JSON object on standard output");
 }
