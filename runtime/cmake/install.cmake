@@ -23,7 +23,7 @@ install(TARGETS ${libraries} EXPORT lspTargets
 install(EXPORT lspTargets NAMESPACE lsp:: DESTINATION ${package_dir} COMPONENT development)
 install(FILES
   ${PROJECT_SOURCE_DIR}/format-spec/include/lsp/layout.h ${PROJECT_SOURCE_DIR}/format-spec/include/lsp/sections.def
-  ${PROJECT_SOURCE_DIR}/format-spec/include/lsp/program.h
+  ${PROJECT_SOURCE_DIR}/format-spec/include/lsp/program.h ${PROJECT_SOURCE_DIR}/format-spec/include/lsp/version.h
   ${headers} ${shader_include}
   DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/lsp COMPONENT development)
 

@@ -1,19 +1,8 @@
 // The CPU tracer: checks what is asked for and hands the rays to the loop for it.
+#include "error.h"
 #include "lsp/lsp.h"
 #include "trace_cells.h"
 #include "trace_loops.h"
-
-namespace {
-
-lsp_status refuse(lsp_error* error, const char* message) {
-  if (error) {
-    *error = {LSP_ERROR_UNSUPPORTED, 0, {}};
-    for (size_t i = 0; i + 1 < sizeof error->message && message[i]; ++i) error->message[i] = message[i];
-  }
-  return LSP_ERROR_UNSUPPORTED;
-}
-
-}  // namespace
 
 extern "C" uint32_t lsp_dial(const lsp_scene* scene, const lsp_trace_options* options) {
   // Without their triangles cells answer from tables alone.
@@ -43,11 +32,20 @@ extern "C" void lsp_add_counts(lsp_trace_counts* sum, const lsp_trace_counts* mo
 
 extern "C" lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options* options, const LspRay* rays,
                                 LspHit* hits, uint64_t count, lsp_trace_counts* counts, lsp_error* error) {
+  if (const uint32_t unknown = options->flags & ~(LSP_TRACE_ALL_FLAGS | LSP_TRACE_MAX_LOSS); unknown != 0)
+    return lsp::fail(error, LSP_ERROR_UNSUPPORTED, 0,
+                     "library version %s does not know trace flags 0x%x: leave them out or link a newer one",
+                     LSP_LIBRARY_VERSION_STRING, unknown);
+  if (options->quality >= LSP_QUALITY_COUNT)
+    return lsp::fail(error, LSP_ERROR_UNSUPPORTED, 0,
+                     "library version %s does not know quality %u: use LSP_QUALITY_*",
+                     LSP_LIBRARY_VERSION_STRING, options->quality);
   const uint32_t features = scene->header->required_features;
   const bool approximate = (options->flags & LSP_TRACE_APPROXIMATE) != 0 &&
                            (features & (LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS)) != 0;
   if (!approximate && !(features & LSP_FEATURE_EXACT))
-    return refuse(error, "the file has no exact tree, trace it approximately or bake it without --no-exact");
+    return lsp::fail(error, LSP_ERROR_UNSUPPORTED, 0,
+                     "the file has no exact tree, trace it approximately or bake it without --no-exact");
   if (approximate && (features & LSP_FEATURE_CELLS) != 0) {
     lsp::trace_cells(*scene, (options->flags & LSP_TRACE_ANY_HIT) != 0, lsp_dial(scene, options), rays, hits,
                      count, counts);

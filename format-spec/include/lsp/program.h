@@ -4,10 +4,12 @@
 #include <stdexcept>
 #include <string>
 
+#include "lsp/version.h"
+
 namespace lsp {
 
 // The programs' own version; the format's is in layout.h.
-inline constexpr const char* kProgramVersion = "0.1.0";
+inline constexpr const char* kProgramVersion = LSP_LIBRARY_VERSION_STRING;
 
 enum class Exit : int {
   kDone = 0,

@@ -16,10 +16,15 @@
 
 #include "lsp/export.h"
 #include "lsp/interface.h"
+#include "lsp/version.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
+
+/* LSP_LIBRARY_VERSION of the library that is linked. It fits this header where major and minor are the
+ * header's. */
+LSP_API uint32_t lsp_version(void);
 
 typedef enum lsp_status {
   LSP_OK = 0,
@@ -28,6 +33,10 @@ typedef enum lsp_status {
   LSP_ERROR_UNSUPPORTED = 5, /* a version, feature or section this library does not know, or a packed file */
   LSP_ERROR_LIMIT = 6,       /* a limit was exceeded: a buffer given is too small, a range too large */
 } lsp_status;
+
+/* A status in a few words, for logs: "the file cannot be read". Of any value; it lives as long as the
+ * program. What was wrong in particular is in lsp_error. */
+LSP_API const char* lsp_status_string(lsp_status status);
 
 typedef struct lsp_error {
   lsp_status status;
@@ -102,7 +111,7 @@ LSP_API lsp_status lsp_unpack(const void* bytes, uint64_t size, void* out, uint6
 #define LSP_DEFAULT(value)
 #endif
 
-/* All zero: exact, closest hits. */
+/* All zero: exact, closest hits. A flag or a quality that the library does not know is refused. */
 typedef struct lsp_trace_options {
   uint32_t flags; /* LSP_TRACE_* */
   float lod; /* theta: stop at a Line Space once its box's diagonal is under lod * distance; 0: deepest only */
@@ -131,11 +140,11 @@ typedef struct lsp_trace_counts {
 /* Adds `more` to *sum, field by field: of threads, or of parts of a set of rays. */
 LSP_API void lsp_add_counts(lsp_trace_counts* sum, const lsp_trace_counts* more);
 
-/* Traces rays[0, count) into hits[0, count), in this thread, with some 20 KiB of its stack. Adds to *counts unless it
- * is NULL. Hand it many rays at once: approximate ones are traced in groups of 16, so that while one waits for memory
- * the others go on.
- * LSP_ERROR_UNSUPPORTED when the file lacks what the options need: an exact tree. A file without Line Spaces
- * (a scene too small to need them) answers approximate traces exactly. */
+/* Traces rays[0, count) into hits[0, count), in this thread, with some 20 KiB of its stack. Adds to *counts
+ * unless it is NULL. Hand it many rays at once: approximate ones are traced in groups of 16, so that while
+ * one waits for memory the others go on. LSP_ERROR_UNSUPPORTED when the file lacks what the options need: an
+ * exact tree; and when this library does not know what they ask for: nothing is traced then. A file without
+ * Line Spaces (a scene too small to need them) answers approximate traces exactly. */
 LSP_API lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options* options, const LspRay* rays,
                              LspHit* hits, uint64_t count, lsp_trace_counts* counts, lsp_error* error);
 

@@ -24,6 +24,7 @@ set(corpus ${SOURCE_DIR}/format-spec/corpus/2.0/valid)
 
 function(run dir)
   step(${dir}/embedded_c ${corpus}/full.lsp)
+  step(${dir}/embedded_plain ${corpus}/full.lsp)
   step(${dir}/embedded_cpp ${corpus}/full.lsp ${corpus}/packed.lsp ${can_unpack})
   if(LINKAGE STREQUAL "shared")
     step(${dir}/embedded_vulkan)

@@ -1,0 +1,57 @@
+// The C interface beside files and rays: versions, statuses, and options that are not known.
+#include <gtest/gtest.h>
+
+#include <set>
+#include <string>
+
+#include "lsp/lsp.h"
+#include "lsp/program.h"
+#include "scene_builder.h"
+
+namespace lsp::test {
+namespace {
+
+TEST(Interface, StatesOneVersion) {
+  EXPECT_EQ(lsp_version(), uint32_t{LSP_LIBRARY_VERSION});
+  EXPECT_STREQ(LSP_LIBRARY_VERSION_STRING, LSP_PROJECT_VERSION);
+  EXPECT_STREQ(kProgramVersion, LSP_PROJECT_VERSION);
+  EXPECT_EQ(std::to_string(LSP_LIBRARY_VERSION_MAJOR) + "." + std::to_string(LSP_LIBRARY_VERSION_MINOR) +
+                "." + std::to_string(LSP_LIBRARY_VERSION_PATCH),
+            LSP_PROJECT_VERSION);
+#if LSP_LIBRARY_VERSION < LSP_MAKE_VERSION(0, 1, 0) || LSP_LIBRARY_VERSION >= LSP_MAKE_VERSION(1000, 0, 0)
+#error "not comparable"
+#endif
+}
+
+TEST(Interface, NamesEveryStatus) {
+  std::set<std::string> names;
+  for (const lsp_status status : {LSP_OK, LSP_ERROR_FILE, LSP_ERROR_INVALID, LSP_ERROR_UNSUPPORTED,
+                                  LSP_ERROR_LIMIT, static_cast<lsp_status>(4)})
+    EXPECT_TRUE(names.insert(lsp_status_string(status)).second) << lsp_status_string(status);
+  EXPECT_TRUE(names.count("unknown status"));
+}
+
+TEST(Interface, RefusesOptionsThatItDoesNotKnow) {
+  Bytes bytes = write_raw(build_parts({}));
+  lsp_scene scene;
+  ASSERT_EQ(lsp_open(bytes.data(), bytes.size(), &scene, nullptr), LSP_OK);
+  const LspRay ray = {{0, 0, -9}, 0, {0, 0, 1}, 100};
+  LspHit hit = {};
+  hit.primitive = 77;
+  lsp_trace_counts counts = {};
+  lsp_error error;
+  const auto trace = [&](const lsp_trace_options& options) {
+    return lsp_trace(&scene, &options, &ray, &hit, 1, &counts, &error);
+  };
+  EXPECT_EQ(trace({LSP_TRACE_APPROXIMATE | 0x40u, 0}), LSP_ERROR_UNSUPPORTED);
+  EXPECT_NE(std::string(error.message).find("flags 0x40"), std::string::npos) << error.message;
+  EXPECT_EQ(trace({0, 0, LSP_QUALITY_COUNT}), LSP_ERROR_UNSUPPORTED);
+  EXPECT_NE(std::string(error.message).find("quality 3"), std::string::npos) << error.message;
+  EXPECT_EQ(hit.primitive, 77u) << "nothing is traced";
+  EXPECT_EQ(counts.rays, 0u);
+  EXPECT_EQ(trace({LSP_TRACE_ALL_FLAGS | LSP_TRACE_MAX_LOSS, 0, LSP_QUALITY_ACCURATE, 5}), LSP_OK);
+  EXPECT_EQ(counts.rays, 1u);
+}
+
+}  // namespace
+}  // namespace lsp::test
