@@ -68,7 +68,7 @@ struct Preset {
   uint32_t far_samples, origin_samples;  // of cells
 };
 const std::map<std::string, Preset> kPresets = {
-    {"fast", {{4, 8, 3}, 24, 8}}, {"balanced", {{6, 9, 5}, 64, 32}}, {"accurate", {{6, 11, 9}, 128, 96}}};
+    {"fast", {{4, 8, 3}, 24, 8}}, {"balanced", {{6, 9, 5}, 64, 24}}, {"accurate", {{6, 11, 9}, 128, 72}}};
 // From cheap to dear, for --max-error.
 const std::vector<Quality> kLadder = {{4, 7, 5}, {4, 9, 5}, {6, 9, 5}, {6, 11, 9}, {8, 11, 9}, {8, 13, 9}};
 constexpr uint64_t kErrorRays = 65536;

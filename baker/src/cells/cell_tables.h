@@ -15,10 +15,10 @@ namespace lsp {
 
 struct CellTableOptions {
   uint32_t far_patches = 3;      // N: patches along an edge of a cell, of far tables
-  uint32_t origin_patches = 4;   // M: of origin tables
-  uint32_t sub_cells = 2;        // along an edge of a cell, 1 to 4
+  uint32_t origin_patches = 3;   // M: of origin tables
+  uint32_t sub_cells = 4;        // along an edge of a cell, 1 to 4
   uint32_t far_samples = 64;     // rays of a mixed shaft
-  uint32_t origin_samples = 32;  // rays of an entry of an origin table, on average
+  uint32_t origin_samples = 24;  // rays of an entry of an origin table, on average, as none is settled
   bool splits = true;
 };
 
