@@ -35,13 +35,21 @@ bool normals_are_geometric(const Mesh& mesh) {
   return true;
 }
 
+// The gaps of a triangle of which this share is solid. What lacks less than half a step of eight bits, in
+// which textures have it, lacks nothing.
+uint32_t gaps_of(float coverage) {
+  const double missing = 1 - double(coverage);
+  if (!(missing > 1.0 / 512)) return 0;
+  return uint32_t(std::min(std::lround(missing * 65536), long{LSP_TRIANGLE_MAX_GAPS}));
+}
+
 void fill_triangles(const Mesh& mesh, const Bvh& bvh, bool normals, bool materials, Baked& baked) {
   baked.triangles.resize(bvh.records.size());
   if (normals) baked.normals.resize(bvh.records.size());
   for (size_t i = 0; i < bvh.records.size(); ++i) {
     const uint32_t t = bvh.records[i];
     const glm::uvec3 corners = mesh.triangles[t];
-    uint32_t flags = 0;
+    uint32_t flags = gaps_of(mesh.materials[mesh.material_ids[t]].opacity) << LSP_TRIANGLE_GAPS_SHIFT;
     if (normals) {
       const auto& n = mesh.normals[t];
       const LspCornerNormals packed = {pack_normal(n[0]), pack_normal(n[1]), pack_normal(n[2])};
@@ -157,6 +165,8 @@ lsp_scene view(const Baked& baked) {
 void set_counts(Baked& baked) {
   LspHeader& h = baked.header;
   format::set_counters(h, SectionArrays{baked});
+  const bool partial = std::any_of(baked.triangles.begin(), baked.triangles.end(), has_gaps);
+  h.required_features = (h.required_features & ~LSP_FEATURE_COVERAGE) | (partial ? LSP_FEATURE_COVERAGE : 0);
   if (!format::is_ntree(h)) return;
   const uint64_t steps = lsp_ntree_steps(&h);
   if (steps > LSP_NONE)
@@ -250,13 +260,14 @@ Baked bake(const Mesh& mesh, const BakeOptions& asked, const Progress& progress)
   }
   if (!ntree) baked.nodes = std::move(bvh.nodes);
 
-  h.required_features =
-      LSP_FEATURE_EXACT | (ntree ? LSP_FEATURE_NTREE : 0) | (cells ? LSP_FEATURE_CELLS : 0) |
-      (baked.line_spaces.records.empty() ? 0 : LSP_FEATURE_LINE_SPACES) |
-      (normals ? LSP_FEATURE_NORMALS : 0) | (shading ? LSP_FEATURE_MATERIALS : 0) |
-      (!baked.line_spaces.records.empty() && options.line_space.kind == LineSpaceKind::kBinary
-           ? LSP_FEATURE_BINARY
-           : 0);
+  h.required_features = LSP_FEATURE_EXACT | (ntree ? LSP_FEATURE_NTREE : 0) |
+                        (cells ? LSP_FEATURE_CELLS : 0) |
+                        (baked.line_spaces.records.empty() ? 0 : LSP_FEATURE_LINE_SPACES) |
+                        (normals ? LSP_FEATURE_NORMALS : 0) | (shading ? LSP_FEATURE_MATERIALS : 0) |
+                        (std::any_of(baked.line_spaces.records.begin(), baked.line_spaces.records.end(),
+                                     [](const LspLineSpace& r) { return entry_bytes(r) == 0; })
+                             ? LSP_FEATURE_BINARY
+                             : 0);
   set_counts(baked);
   if (cells) choose_dial(baked);
   return baked;

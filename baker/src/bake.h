@@ -102,8 +102,9 @@ void keep_tables_only(Baked& baked);
 // The bake as a scene to trace; it points into `baked`.
 lsp_scene view(const Baked& baked);
 
-// Sets the header's counts, and what follows from them, to those of the sections. Throws Failure with
-// Exit::kLimit where the header has no room for what follows.
+// Sets the header's counts, and what follows from them, to those of the sections, and the feature bit of
+// triangles that are there in part. Throws Failure with Exit::kLimit where the header has no room for what
+// follows.
 void set_counts(Baked& baked);
 
 // A number for people: 1,234,567.

@@ -86,24 +86,26 @@ class Filler {
     // A flat box gets a thickness, and geometry on a side of the box comes to lie inside: far more than the
     // rounding of a passage (lsp/traverse.h), far less than a patch.
     const glm::vec3 lo = vec(site.lo), hi = vec(site.hi);
+    binary_ = options.kind == LineSpaceKind::kBinary && !holds_gaps(site.subtree);
+    conservative_ = binary_ && options.conservative;
     const glm::vec3 extent = hi - lo;
     const glm::vec3 reach = glm::max(glm::abs(lo), glm::abs(hi));
     const float margin = std::max({extent.x, extent.y, extent.z}) * 1e-4f +
                          std::max({reach.x, reach.y, reach.z}) * 3.8146973e-6f;
     // Geometry of a node then is inside by the margin too, and need not be looked for outside.
-    if (options.conservative) empty_margin_ = empty_margin(header);
+    if (conservative_) empty_margin_ = empty_margin(header);
     lo_ = lo - std::max(margin, 2 * float(empty_margin_));
     hi_ = hi + std::max(margin, 2 * float(empty_margin_));
   }
 
   Filled run() {
     const uint32_t n = options_.resolution;
-    if (options_.conservative) return pack(touched());
-    const bool binary = options_.kind == LineSpaceKind::kBinary, symmetric = binary && !options_.directed;
+    if (conservative_) return pack(touched());
+    const bool symmetric = binary_ && !options_.directed;
     const uint32_t shafts = (symmetric ? 15 : 30) * n * n * n * n;
     std::vector<uint32_t> hit(shafts, LSP_NONE);
     const uint32_t patches = n * n;
-    samples_ = shaft_samples(binary ? 1 : options_.samples);
+    samples_ = shaft_samples(binary_ ? 1 : options_.samples);
     every_patch_.resize(patches);
     std::iota(every_patch_.begin(), every_patch_.end(), 0u);
     raster_.emplace(lo_, hi_, n);
@@ -158,6 +160,22 @@ class Filler {
       if (!in_cell || reaches_into(scene_.triangles[i], lo, hi)) shafts.add(scene_.triangles[i], i, either);
   }
 
+  // Whether a triangle that reaches into the box of the site is there in part.
+  bool holds_gaps(uint32_t child) const {
+    const auto apart = [&](const lsp_float3& l, const lsp_float3& h) {
+      return l.x > site_.hi.x || l.y > site_.hi.y || l.z > site_.hi.z || h.x < site_.lo.x ||
+             h.y < site_.lo.y || h.z < site_.lo.z;
+    };
+    if (!(child & LSP_LEAF_BIT)) {
+      const LspNode& node = scene_.nodes[child];
+      return (!apart(node.lo0, node.hi0) && holds_gaps(node.child0)) ||
+             (!apart(node.lo1, node.hi1) && holds_gaps(node.child1));
+    }
+    const uint32_t first = child & LSP_LEAF_FIRST_MASK;
+    const uint32_t count = (child >> LSP_LEAF_COUNT_SHIFT & LSP_LEAF_COUNT_MASK) + 1;
+    return std::any_of(&scene_.triangles[first], &scene_.triangles[first] + count, has_gaps);
+  }
+
   // The triangles that reach into the box, for the raster; false when they are too many for it.
   bool gather(uint32_t child) {
     const auto apart = [&](const lsp_float3& l, const lsp_float3& h) {
@@ -201,7 +219,7 @@ class Filler {
     rays_.clear();
     hits_.resize(wanted.size());
     for (uint32_t q : wanted) rays_.push_back({f3(a), 0.0f, f3(ends[q] - a), 1.0f});
-    const lsp_trace_options trace = {options_.kind == LineSpaceKind::kBinary ? LSP_TRACE_ANY_HIT : 0u, 0.0f};
+    const lsp_trace_options trace = {binary_ ? LSP_TRACE_ANY_HIT : 0u, 0.0f};
     if (lsp_trace(&scene_, &trace, rays_.data(), hits_.data(), rays_.size(), nullptr, nullptr) != LSP_OK)
       throw Failure(Exit::kInternal, "", "the tracer refused the baker's own tree");
     for (size_t i = 0; i < wanted.size(); ++i) {
@@ -254,6 +272,12 @@ class Filler {
       best_cost = 0;
       return record(0);
     }
+    // A candidate with gaps sends the rays into the node (lsp/traverse.h): no plane answers them better.
+    for (uint32_t i = 0; i < count && options_.exact; ++i)
+      if (record(i) != LSP_NONE && has_gaps(scene_.triangles[record(i)])) {
+        best_cost = 0;
+        return record(i);
+      }
     uint32_t best = LSP_NONE;
     for (uint32_t c = 0; c < count; ++c) {
       if (record(c) == LSP_NONE) continue;
@@ -283,7 +307,6 @@ class Filler {
     const uint32_t n = options_.resolution;
     const uint32_t shafts = uint32_t(hit.size());
     const uint32_t filled = uint32_t(shafts - size_t(std::count(hit.begin(), hit.end(), LSP_NONE)));
-    const bool binary = options_.kind == LineSpaceKind::kBinary;
     uint32_t first = site_.triangle_first, count = site_.triangle_count;
     if (count == 0 && filled > 0) {
       first = *std::min_element(hit.begin(), hit.end());
@@ -291,11 +314,11 @@ class Filler {
       for (uint32_t t : hit) last = t == LSP_NONE ? last : std::max(last, t);
       count = last - first + 1;
     }
-    const uint32_t bytes = binary ? 0 : count < 0xFF ? 1 : count < 0xFFFF ? 2 : 4;
+    const uint32_t bytes = binary_ ? 0 : count < 0xFF ? 1 : count < 0xFFFF ? 2 : 4;
     const uint32_t word_count = (shafts + 31) / 32;
     // Section 3.1: the sparse layout costs two words per 32 shafts, the dense one an entry per empty shaft.
-    const bool dense = !binary && uint64_t(shafts) * bytes <
-                                      uint64_t(word_count) * sizeof(LspBitWord) + uint64_t(filled) * bytes;
+    const bool dense = !binary_ && uint64_t(shafts) * bytes <
+                                       uint64_t(word_count) * sizeof(LspBitWord) + uint64_t(filled) * bytes;
 
     Filled result;
     const glm::vec3 scale = float(n) / (hi_ - lo_);
@@ -306,8 +329,8 @@ class Filler {
                      f3(scale),
                      first,
                      n | bytes << LSP_FORMAT_ENTRY_SHIFT | (dense ? LSP_FORMAT_DENSE : 0) |
-                         (binary && !options_.directed ? LSP_FORMAT_SYMMETRIC : 0) |
-                         (options_.conservative ? LSP_FORMAT_CONSERVATIVE : 0),
+                         (binary_ && !options_.directed ? LSP_FORMAT_SYMMETRIC : 0) |
+                         (conservative_ ? LSP_FORMAT_CONSERVATIVE : 0),
                      filled,
                      count,
                      site_.child};
@@ -322,7 +345,7 @@ class Filler {
         offset += uint32_t(std::popcount(bits));
       }
     }
-    if (!binary) {
+    if (!binary_) {
       const uint32_t entries = dense ? shafts : filled;
       const uint32_t per_word = 4 / bytes;
       result.candidates.assign((entries + per_word - 1) / per_word, 0);
@@ -343,6 +366,7 @@ class Filler {
   const LineSpaceSite& site_;
   lsp_scene scene_{};
   glm::vec3 lo_, hi_;
+  bool binary_ = false, conservative_ = false;
   double empty_margin_ = 0;
   std::vector<Sample> samples_;
   std::optional<ShaftRaster> raster_;  // none: too many triangles, the rays are traced
@@ -371,8 +395,8 @@ LineSpaces fill_line_spaces(const Bvh& bvh, const LspHeader& header, std::span<c
     all.candidates.keep_in_file(options.folder);
   }
   const uint32_t n = options.resolution;
-  const bool symmetric = options.kind == LineSpaceKind::kBinary && !options.directed;
-  const uint64_t shafts = (symmetric ? 15ull : 30ull) * n * n * n * n;
+  const auto shafts_of = [n](bool symmetric) { return (symmetric ? 15ull : 30ull) * n * n * n * n; };
+  const uint64_t shafts = shafts_of(options.kind == LineSpaceKind::kBinary && !options.directed);
   references.assign(sites.size(), LSP_NONE);
   // A batch at a time, so that no more than one is in memory twice.
   const size_t batch_sites = size_t(std::max<uint64_t>(2, options.batch_bytes / (shafts * kBytesPerShaft)));
@@ -400,7 +424,7 @@ LineSpaces fill_line_spaces(const Bvh& bvh, const LspHeader& header, std::span<c
     f.record.candidate_first = f.candidates.empty() ? 0 : uint32_t(all.candidates.size());
     all.words.append(f.words);
     all.candidates.append(f.candidates);
-    all.shafts += shafts;
+    all.shafts += shafts_of((f.record.format & LSP_FORMAT_SYMMETRIC) != 0);
     all.filled += f.record.filled;
     all.dense += (f.record.format & LSP_FORMAT_DENSE) ? 1 : 0;
     references[i] = uint32_t(all.records.size()) | LSP_TERMINAL_BIT;

@@ -18,8 +18,12 @@ namespace lsp {
 
 enum class LineSpaceKind {
   kCandidates,  // a representative triangle per shaft and direction
-  kBinary,      // one bit per shaft, both directions together: enough for visibility
+  kBinary,  // one bit per shaft, both directions together: enough for visibility. A node with a triangle that
+            // is there in part has candidates all the same: a bit does not say which rays pass
 };
+
+// Whether a triangle is there in part.
+inline bool has_gaps(const LspTriangle& t) { return t.flags >> LSP_TRIANGLE_GAPS_SHIFT != 0; }
 
 struct LineSpaceOptions {
   LineSpaceKind kind = LineSpaceKind::kCandidates;
@@ -30,6 +34,8 @@ struct LineSpaceOptions {
   // Rays per shaft that choose its candidate: 1 is the paper's centroid ray, more pick the triangle (or none)
   // whose plane answers all of them best.
   uint32_t samples = 5;
+  // Rays can be traced exactly through a node that a Line Space stands for: keep_approximate_only is not asked for.
+  bool exact = true;
   // Not empty: words and candidates lie in temporary files in this folder.
   std::filesystem::path folder;
   uint64_t batch_bytes = 64u << 20;  // filled Line Spaces that are held besides, about

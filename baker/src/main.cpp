@@ -268,6 +268,7 @@ Exit run(Arguments a) {
       a.purpose == Purpose::kVisibility ? LineSpaceKind::kBinary : LineSpaceKind::kCandidates;
   options.line_space.conservative = a.conservative;
   options.line_space.directed = a.directed;
+  options.line_space.exact = !a.no_exact;
   options.normal_angle_degrees = a.normal_angle;
   options.plane_tolerance = a.plane_tolerance;
   options.memory_limit = a.memory_limit;
@@ -323,6 +324,7 @@ Exit run(Arguments a) {
   bar.clear();
 
   const uint64_t peak = peak_memory_bytes();
+  const auto partial = uint64_t(std::count_if(baked.triangles.begin(), baked.triangles.end(), has_gaps));
   const LineSpaces& ls = baked.line_spaces;
   if (a.common.json) {
     Json sections = Json::array();
@@ -336,6 +338,7 @@ Exit run(Arguments a) {
                    {"error", meta["error"]},
                    {"nodes", baked.header.node_count},
                    {"triangle_records", baked.header.triangle_count},
+                   {"partial_records", partial},
                    {"depth", baked.header.max_depth},
                    {"line_spaces", baked.header.line_space_count},
                    {"shafts", ls.shafts},
@@ -362,6 +365,7 @@ Exit run(Arguments a) {
       std::printf("origin      %.17g %.17g %.17g: positions, rays and hits are relative to it\n",
                   mesh.origin.x, mesh.origin.y, mesh.origin.z);
     for (const std::string& note : mesh.notes) std::printf("note        %s\n", note.c_str());
+    if (partial) std::printf("partial     %" PRIu64 " triangle records are there in part\n", partial);
     std::printf("tree        %u nodes, %u triangle records, depth %u\n", baked.header.node_count,
                 baked.header.triangle_count, baked.header.max_depth);
     if (const LspCellGrid& g = baked.header.cells; cells)

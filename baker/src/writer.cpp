@@ -169,7 +169,7 @@ Written write_lsp(const std::filesystem::path& path, Baked& baked, const std::st
   h.magic_0 = LSP_MAGIC_0;
   h.magic_1 = LSP_MAGIC_1;
   h.version_major = LSP_VERSION_MAJOR;
-  h.version_minor = LSP_VERSION_MINOR;
+  h.version_minor = lsp_version_minor(h.required_features);
   h.header_bytes = sizeof(LspHeader);
   h.section_count = uint32_t(sections.size());
   h.section_table_offset = sizeof(LspHeader);

@@ -24,7 +24,7 @@ void identification(Collector& c) {
   c.header(RuleId::kBadMagic, "the first byte is 8A", [](LspHeader& h) { h.magic_0 += 1; });
   c.raw(RuleId::kTextDamage, "CR LF of the signature became LF", [](Bytes& b) { b.erase(b.begin() + 4); });
   c.header(RuleId::kOtherMajor, "version_major is 1", [](LspHeader& h) { h.version_major = 1; });
-  c.header(RuleId::kNewerMinor, "version_minor is 1", [](LspHeader& h) { h.version_minor = 1; });
+  c.header(RuleId::kNewerMinor, "version_minor is 9", [](LspHeader& h) { h.version_minor = 9; });
   c.header(RuleId::kUnknownRequired, "bit 31 of required_features is set",
            [](LspHeader& h) { h.required_features |= 0x80000000u; });
   c.header(RuleId::kUnknownOptional, "bit 0 of optional_features is set",
@@ -299,6 +299,15 @@ void geometry(Collector& c) {
              [](Image& i) { i.triangles[3].flags |= 2; });
   c.geometry(RuleId::kSmoothFlag, "SMOOTH of triangle 3 is the other way round",
              [](Image& i) { i.triangles[3].flags ^= LSP_TRIANGLE_SMOOTH; });
+  c.geometry(RuleId::kCoverageFeature, "COVERAGE is set, all triangles are solid", [](Image& i) {
+    for (LspMaterial& m : i.materials) m.opacity = 1;
+    i.header.required_features |= LSP_FEATURE_COVERAGE;
+  });
+  c.geometry(RuleId::kGapsDiffer, "the gaps of triangle 3 are half of what its material leaves",
+             [](Image& i) {
+               i = partial(i);
+               i.triangles[3].flags ^= 0xC000u << LSP_TRIANGLE_GAPS_SHIFT;
+             });
   c.geometry(RuleId::kTriangleOutsideLeaf, "triangle 3 moves down by 100", [](Image& i) {
     for (lsp_float3* v : {&i.triangles[3].v0, &i.triangles[3].v1, &i.triangles[3].v2}) v->y -= 100;
   });

@@ -80,7 +80,6 @@ class Builder {
     h.magic_0 = LSP_MAGIC_0;
     h.magic_1 = LSP_MAGIC_1;
     h.version_major = LSP_VERSION_MAJOR;
-    h.version_minor = LSP_VERSION_MINOR;
     h.header_bytes = sizeof(LspHeader);
     h.base_structure = LSP_BASE_NTREE;
     h.primitive_count = image_.triangles.size();

@@ -30,7 +30,6 @@ class Builder {
     header.magic_0 = LSP_MAGIC_0;
     header.magic_1 = LSP_MAGIC_1;
     header.version_major = LSP_VERSION_MAJOR;
-    header.version_minor = LSP_VERSION_MINOR;
     header.header_bytes = sizeof(LspHeader);
     header.base_structure = LSP_BASE_BVH;
     header.primitive_count = input_.size();
@@ -176,10 +175,11 @@ Bytes packed(const Image& image) {
   return encode(sections);
 }
 
-// What a writer of version 1.1 might add: an unknown optional feature and an unknown optional section.
+// What a writer of a later minor version might add: an unknown optional feature and an unknown optional
+// section.
 Bytes newer_minor() {
   Sections sections = to_sections(box_on_floor({}));
-  sections.header.version_minor = 1;
+  sections.header.version_minor = 9;
   sections.header.optional_features = 0x1;
   const std::array<std::byte, 16> data{};
   sections.sections.push_back(make_section(0x57454E78u, 0, 4, data));  // "xNEW"
@@ -195,6 +195,15 @@ Image full_scene() {
   image.meta = "{\"tool\":\"corpus\",\"inputs\":[\"box.obj\"]}";
   image.header.source_hash_lo = 0x0123456789ABCDEFu;
   image.header.source_hash_hi = 0xFEDCBA9876543210u;
+  return image;
+}
+
+Image partial(Image image) {
+  image.header.required_features |= LSP_FEATURE_COVERAGE;
+  image.header.version_minor = lsp_version_minor(image.header.required_features);
+  for (LspTriangle& t : image.triangles)
+    t.flags |= static_cast<uint32_t>((1 - image.materials[t.material].opacity) * 65536)
+               << LSP_TRIANGLE_GAPS_SHIFT;
   return image;
 }
 
@@ -258,6 +267,7 @@ std::vector<ValidFile> valid_files() {
   add("packed", "every section packed with zstd", packed(full_scene()));
   add("packed-4096", "packed, the raw form aligned to 4096", packed(with_alignment(full_scene(), 4096)));
   add("newer-minor", "a later minor version with an unknown optional feature and section", newer_minor());
+  add("coverage", "triangles that are there in part", encode(partial(full_scene())));
   add("cells", "cells beside a BVH", encode(full_cells_scene()));
   add("cells-tables", "cells alone: tables and the triangles of their planes",
       encode(full_cells_scene(false)));

@@ -28,6 +28,9 @@ Image box_on_floor(const SceneOptions& options);
 // The scene that mutations start from: all features, Line Spaces of N = 1 on two levels.
 Image full_scene();
 
+// The scene with the gaps that its materials' opacity says.
+Image partial(Image image);
+
 struct ValidFile {
   std::string name;   // without ".lsp"
   std::string shows;  // one sentence

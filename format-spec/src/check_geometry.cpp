@@ -71,6 +71,7 @@ class GeometryCheck {
 
   void run() {
     for (uint64_t i = 0; i < triangles_.size(); ++i) check_triangle(i);
+    check_coverage();
     for (uint64_t i = 0; i < normals_.size(); ++i) check_normals(i);
     const std::span<const LspMaterial> materials = view_.elements<LspMaterial>(Kind::kMatl);
     for (uint64_t i = 0; i < materials.size(); ++i) check_material(i, materials[i]);
@@ -106,7 +107,7 @@ class GeometryCheck {
       find_triangle(RuleId::kMaterialOutOfRange, i, "material", offsetof(LspTriangle, material), 4,
                     "is " + std::to_string(t.material) + ", material_count is " +
                         std::to_string(header.material_count));
-    if (t.flags & ~LSP_TRIANGLE_SMOOTH)
+    if (t.flags & ~(LSP_TRIANGLE_SMOOTH | LSP_TRIANGLE_MAX_GAPS << LSP_TRIANGLE_GAPS_SHIFT))
       find_triangle(RuleId::kTriangleFlags, i, "flags", offsetof(LspTriangle, flags), 4,
                     "an unknown flag is set");
     bool smooth = false;
@@ -116,6 +117,30 @@ class GeometryCheck {
       find_triangle(RuleId::kSmoothFlag, i, "flags", offsetof(LspTriangle, flags), 4,
                     smooth ? "SMOOTH is clear, but the corner normals differ"
                            : "SMOOTH is set, but the corner normals do not differ");
+  }
+
+  // Triangles that are there in part, against the feature and against what their materials say.
+  void check_coverage() {
+    const bool declared = (view_.header.required_features & LSP_FEATURE_COVERAGE) != 0;
+    const std::span<const LspMaterial> materials = view_.elements<LspMaterial>(Kind::kMatl);
+    bool any = false;
+    for (uint64_t i = 0; i < triangles_.size(); ++i) {
+      const LspTriangle& t = triangles_[i];
+      const uint32_t gaps = t.flags >> LSP_TRIANGLE_GAPS_SHIFT;
+      any = any || gaps != 0;
+      if (!declared || t.material >= materials.size()) continue;
+      const float missing = 1 - materials[t.material].opacity;
+      if (!(std::abs(std::ldexp(static_cast<float>(gaps), -16) - missing) <= 1.0f / 512))
+        find_triangle(RuleId::kGapsDiffer, i, "flags", offsetof(LspTriangle, flags), 4,
+                      std::to_string(gaps) + " of 65536 rays pass, its material has the opacity " +
+                          std::to_string(materials[t.material].opacity));
+    }
+    const Part& section = view_.part(Kind::kTria);
+    if (any != declared && (any || section.usable || !section.present))
+      report_.add(RuleId::kCoverageFeature, offsetof(LspHeader, required_features), 4,
+                  "/header/required_features",
+                  declared ? "COVERAGE is set, but every triangle is solid"
+                           : "COVERAGE is clear, but a triangle has gaps");
   }
 
   void check_normals(uint64_t i) {

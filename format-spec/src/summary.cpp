@@ -24,7 +24,7 @@ Json feature_names(uint32_t features) {
   } kNames[] = {{LSP_FEATURE_EXACT, "exact"},     {LSP_FEATURE_LINE_SPACES, "line spaces"},
                 {LSP_FEATURE_NORMALS, "normals"}, {LSP_FEATURE_MATERIALS, "materials"},
                 {LSP_FEATURE_NTREE, "ntree"},     {LSP_FEATURE_BINARY, "binary"},
-                {LSP_FEATURE_CELLS, "cells"}};
+                {LSP_FEATURE_CELLS, "cells"},     {LSP_FEATURE_COVERAGE, "coverage"}};
   Json names = Json::array();
   for (const auto& feature : kNames)
     if (features & feature.bit) names.push_back(feature.name);

@@ -46,9 +46,11 @@ extern "C" lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options*
   if (!approximate && !(features & LSP_FEATURE_EXACT))
     return lsp::fail(error, LSP_ERROR_UNSUPPORTED, 0,
                      "the file has no exact tree, trace it approximately or bake it without --no-exact");
+  const bool partial = (features & LSP_FEATURE_COVERAGE) != 0;
   if (approximate && (features & LSP_FEATURE_CELLS) != 0) {
-    lsp::trace_cells(*scene, (options->flags & LSP_TRACE_ANY_HIT) != 0, lsp_dial(scene, options), rays, hits,
-                     count, counts);
+    lsp::TraceCells& trace = partial ? lsp::partial::trace_cells : lsp::solid::trace_cells;
+    trace(*scene, (options->flags & LSP_TRACE_ANY_HIT) != 0, lsp_dial(scene, options), rays, hits, count,
+          counts);
     return LSP_OK;
   }
   uint32_t flags = options->flags & (approximate ? lsp::kApproximateFlags : lsp::kExactFlags);
@@ -56,7 +58,8 @@ extern "C" lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options*
   if ((features & kConservative) != kConservative) flags &= ~LSP_TRACE_SKIP_EMPTY;
   if (flags & LSP_TRACE_NEAR_APPROXIMATE) flags &= ~LSP_TRACE_NEAR_SKIP;
   const bool ntree = scene->header->base_structure == LSP_BASE_NTREE;
-  const lsp::TraceLoops& loops = ntree ? lsp::kNTreeLoops : lsp::kBvhLoops;
+  const lsp::TraceLoops& loops = partial ? (ntree ? lsp::partial::kNTreeLoops : lsp::partial::kBvhLoops)
+                                         : (ntree ? lsp::solid::kNTreeLoops : lsp::solid::kBvhLoops);
   loops.of[flags](*scene, options->lod, rays, hits, count, counts);
   return LSP_OK;
 }

@@ -1,6 +1,7 @@
 #include "trace_group.h"
+#include "trace_variant.h"
 
-namespace lsp {
+namespace lsp::LSP_VARIANT {
 namespace {
 
 using namespace subset;
@@ -19,4 +20,4 @@ struct BvhTraversal {
 
 const TraceLoops kBvhLoops = loops_of<BvhTraversal>();
 
-}  // namespace lsp
+}  // namespace lsp::LSP_VARIANT

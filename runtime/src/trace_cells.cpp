@@ -1,8 +1,9 @@
 #include "trace_cells.h"
 
 #include "trace_group.h"
+#include "trace_variant.h"
 
-namespace lsp {
+namespace lsp::LSP_VARIANT {
 namespace {
 
 using namespace subset;
@@ -10,6 +11,7 @@ using namespace subset;
 struct CellsTraversal {
 #define LSP_CELLS
 #include "lsp/traverse.h"
+#undef LSP_CELLS
 };
 
 template <uint32_t kFlags>
@@ -31,4 +33,4 @@ void trace_cells(const lsp_scene& scene, bool any_hit, uint32_t dial, const LspR
            : trace<LSP_TRACE_APPROXIMATE>)(scene, dial, rays, hits, count, counts);
 }
 
-}  // namespace lsp
+}  // namespace lsp::LSP_VARIANT

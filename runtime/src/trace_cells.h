@@ -6,7 +6,14 @@
 namespace lsp {
 
 // Adds to *counts unless it is null.
-void trace_cells(const lsp_scene& scene, bool any_hit, uint32_t dial, const LspRay* rays, LspHit* hits,
-                 uint64_t count, lsp_trace_counts* counts);
+using TraceCells = void(const lsp_scene& scene, bool any_hit, uint32_t dial, const LspRay* rays, LspHit* hits,
+                        uint64_t count, lsp_trace_counts* counts);
+
+namespace solid {
+TraceCells trace_cells;
+}
+namespace partial {  // some triangles are
+TraceCells trace_cells;
+}
 
 }  // namespace lsp

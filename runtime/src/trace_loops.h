@@ -18,7 +18,12 @@ struct TraceLoops {
   TraceLoop of[LSP_TRACE_ALL_FLAGS + 1];
 };
 
-extern const TraceLoops kBvhLoops;
-extern const TraceLoops kNTreeLoops;
+// Of scenes whose triangles are solid, and of those where some are there in part.
+namespace solid {
+extern const TraceLoops kBvhLoops, kNTreeLoops;
+}
+namespace partial {
+extern const TraceLoops kBvhLoops, kNTreeLoops;
+}
 
 }  // namespace lsp

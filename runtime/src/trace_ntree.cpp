@@ -1,6 +1,7 @@
 #include "trace_group.h"
+#include "trace_variant.h"
 
-namespace lsp {
+namespace lsp::LSP_VARIANT {
 namespace {
 
 using namespace subset;
@@ -8,6 +9,7 @@ using namespace subset;
 struct NTreeTraversal {
 #define LSP_NTREE
 #include "lsp/traverse.h"
+#undef LSP_NTREE
 
   LSP_STEP void fetch_leaf(const lsp_scene& scene) const {
     fetch(scene.references, lsp_walk.ref & ~LSP_LEAF_BIT);
@@ -24,4 +26,4 @@ struct NTreeTraversal {
 
 const TraceLoops kNTreeLoops = loops_of<NTreeTraversal>();
 
-}  // namespace lsp
+}  // namespace lsp::LSP_VARIANT

@@ -134,6 +134,20 @@ LspHit to_hit(const RTCRayHit& query, const std::vector<uint32_t>& primitives) {
 
 constexpr size_t kStreamRays = 1024;
 
+// A hit is none where the ray passes the triangle.
+void drop_passed(const RTCFilterFunctionNArguments* args) {
+  const Soup& soup = *static_cast<const Soup*>(args->geometryUserPtr);
+  for (unsigned i = 0; i < args->N; ++i) {
+    if (args->valid[i] != -1) continue;
+    LspRay ray{};
+    ray.origin = {RTCRayN_org_x(args->ray, args->N, i), RTCRayN_org_y(args->ray, args->N, i),
+                  RTCRayN_org_z(args->ray, args->N, i)};
+    ray.direction = {RTCRayN_dir_x(args->ray, args->N, i), RTCRayN_dir_y(args->ray, args->N, i),
+                     RTCRayN_dir_z(args->ray, args->N, i)};
+    if (passes(soup, RTCHitN_primID(args->hit, args->N, i), ray)) args->valid[i] = 0;
+  }
+}
+
 }  // namespace
 
 const char* EmbreeScene::version() { return RTC_VERSION_STRING; }
@@ -159,6 +173,12 @@ EmbreeScene::EmbreeScene(const Soup& soup, EmbreeMode mode, unsigned threads)
       for (size_t k = 0; k < 3; ++k) vertices[3 * i + k] = soup.corners[i][k];
     }
     for (uint32_t i = 0; i < 3 * soup.size(); ++i) indices[i] = i;
+  }
+  if (!soup.gaps.empty()) {
+    gaps_ = std::make_unique<Soup>(soup);
+    rtcSetGeometryUserData(geometry, gaps_.get());
+    rtcSetGeometryIntersectFilterFunction(geometry, drop_passed);
+    rtcSetGeometryOccludedFilterFunction(geometry, drop_passed);
   }
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(scene_.get(), geometry);

@@ -15,7 +15,8 @@ enum class EmbreeMode { kRobust, kFast };
 // Which of Embree's entry points answers: one ray a call, packets of 8 or 16, or streams of 1024.
 enum class EmbreeCall { kSingle, kPacket8, kPacket16, kStream };
 
-// An Embree scene whose primitive numbers are import numbers. Tracing is thread-safe.
+// An Embree scene whose primitive numbers are import numbers. Of a soup with gaps it has a copy, which a
+// filter asks of every hit. Tracing is thread-safe.
 class EmbreeScene {
  public:
   // `threads` bounds the build's threads only; 0: all. Throws Failure(kInternal) with Embree's own words.
@@ -43,6 +44,7 @@ class EmbreeScene {
   std::unique_ptr<int64_t> allocated_;  // outlives the device, whose monitor adds to it
   std::unique_ptr<std::remove_pointer_t<RTCDevice>, ReleaseDevice> device_;
   std::unique_ptr<std::remove_pointer_t<RTCScene>, ReleaseScene> scene_;
+  std::unique_ptr<Soup> gaps_;        // none: all is solid
   std::vector<uint32_t> primitives_;  // Embree's number to import number
   double build_seconds_ = 0;
   uint64_t bytes_ = 0;

@@ -1,6 +1,7 @@
 #include "soup.h"
 
 #include <algorithm>
+#include <bit>
 #include <numeric>
 #include <tuple>
 
@@ -56,6 +57,7 @@ Soup soup_of(const lsp_scene& scene) {
     if (!soup.primitives.empty() && soup.primitives.back() == t.primitive) continue;
     soup.primitives.push_back(t.primitive);
     soup.corners.push_back({to_glm(t.v0), to_glm(t.v1), to_glm(t.v2)});
+    if ((scene.header->required_features & LSP_FEATURE_COVERAGE) != 0) soup.gaps.push_back(t.flags >> 16);
     if (scene.normals) {
       const LspCornerNormals& n = scene.normals[i];
       soup.normals.push_back({decode_normal(n.n0), decode_normal(n.n1), decode_normal(n.n2)});
@@ -75,6 +77,19 @@ Soup soup_of(const Mesh& mesh) {
   }
   finish(soup, mesh.primitive_count);
   return soup;
+}
+
+bool passes(const Soup& soup, uint32_t triangle, const LspRay& ray) {
+  if (soup.gaps.empty() || soup.gaps[triangle] == 0) return false;
+  const auto bits = [](float x) { return std::bit_cast<uint32_t>(x); };
+  uint32_t h = 0;
+  for (const uint32_t w : {bits(ray.origin.x), bits(ray.origin.y), bits(ray.origin.z), bits(ray.direction.x),
+                           bits(ray.direction.y), bits(ray.direction.z), soup.primitives[triangle]})
+    h = std::rotl(h ^ (std::rotl(w * 0xCC9E2D51u, 15) * 0x1B873593u), 13) * 5 + 0xE6546B64u;
+  h = (h ^ h >> 16) * 0x85EBCA6Bu;
+  h = (h ^ h >> 13) * 0xC2B2AE35u;
+  h ^= h >> 16;
+  return h >> 16 < soup.gaps[triangle];
 }
 
 glm::dvec3 geometric_normal(const std::array<glm::vec3, 3>& corners) {

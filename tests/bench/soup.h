@@ -18,6 +18,7 @@ struct Soup {
   std::vector<std::array<glm::vec3, 3>> corners;  // per triangle
   std::vector<std::array<glm::vec3, 3>> normals;  // per triangle, unit; empty: take the geometric normal
   std::vector<uint32_t> primitives;               // per triangle: number in import order, ascending
+  std::vector<uint32_t> gaps;                     // per triangle: LSP_TRIANGLE_GAPS; empty: all are solid
   std::vector<uint32_t> triangle_of;              // per primitive: triangle or LSP_NONE (rejected at import)
   glm::dvec3 lo{0}, hi{0};
   double diagonal = 0;
@@ -30,6 +31,9 @@ struct Soup {
 Soup soup_of(const lsp_scene& scene);
 
 Soup soup_of(const Mesh& mesh);
+
+// Whether the ray passes a triangle that is there in part, as the specification states it.
+bool passes(const Soup& soup, uint32_t triangle, const LspRay& ray);
 
 // (v1 - v0) x (v2 - v0), in double: twice the area times the unit normal.
 glm::dvec3 geometric_normal(const std::array<glm::vec3, 3>& corners);

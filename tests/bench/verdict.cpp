@@ -95,7 +95,8 @@ std::optional<uint32_t> ideal_closest(const Soup& soup, const LspRay& ray, Ideal
     const double margin = 1e-9 * (std::abs(wa) + std::abs(wb) + std::abs(wc)) + 1e-300;
     if (std::min({wa, wb, wc}) < -margin && std::max({wa, wb, wc}) > margin) continue;
     const IdealHit candidate = ideal_hit(ray, c);
-    if (candidate.inside && !candidate.graze() && (!nearest || candidate.t < hit->t)) {
+    if (candidate.inside && !candidate.graze() && !passes(soup, i, ray) &&
+        (!nearest || candidate.t < hit->t)) {
       nearest = i;
       *hit = candidate;
     }
@@ -127,6 +128,7 @@ Verdict judge(const Soup& soup, const LspRay& ray, const LspHit& ours, const Lsp
     if (hit.primitive == LSP_NONE) return !nearest;
     if (!triangle_of(hit)) return false;
     if (nearest && triangle_of(hit) == &soup.corners[*nearest]) return true;
+    if (passes(soup, soup.triangle_of[hit.primitive], ray)) return false;
     const IdealHit own = ideal_hit(ray, *triangle_of(hit));
     grazed = grazed || own.graze();
     return (own.inside || own.graze()) &&

@@ -77,7 +77,9 @@ HWY_INLINE uint32_t hit_children(const WideNode& node, const Frame& frame, float
 
 // lsp_triangle for four: the edge functions side by side, the depth of those few that pass by the library's
 // own lsp_plane_depth.
-HWY_INLINE void hit_block(const TriangleBlock& block, const LspSetup& s, const Frame& frame, LspBest& best) {
+// `partial` are the records of a scene where some are there in part, else null.
+HWY_INLINE void hit_block(const TriangleBlock& block, const LspTriangle* partial, const LspSetup& s,
+                          const Frame& frame, LspBest& best) {
   const CappedTag<float, kBlockTriangles> d;
   wide::Text text;
   const glm::vec3 direction = text.lsp_rotate(s.direction, s.axis);
@@ -123,6 +125,7 @@ HWY_INLINE void hit_block(const TriangleBlock& block, const LspSetup& s, const F
       };
       const float t = text.lsp_plane_depth(direction, s.shear.z, seen(0), seen(1), seen(2));
       if (!(t > s.tmin && t < best.t)) continue;
+      if (partial != nullptr && text.lsp_passes(s, partial[block.record[i + lane]])) continue;
       best.t = t;
       best.u = vs[lane] / det;
       best.v = ws[lane] / det;
@@ -135,8 +138,8 @@ HWY_INLINE void hit_block(const TriangleBlock& block, const LspSetup& s, const F
 constexpr size_t kStack = LSP_MAX_STACK * (kWideChildren - 1) + 1;
 
 template <bool kAny>
-HWY_INLINE void traverse(const WideNode* nodes, const TriangleBlock* blocks, const LspSetup& s,
-                         LspBest& best) {
+HWY_INLINE void traverse(const WideNode* nodes, const TriangleBlock* blocks, const LspTriangle* partial,
+                         const LspSetup& s, LspBest& best) {
   struct Entry {
     float t;
     uint32_t ref;
@@ -149,7 +152,7 @@ HWY_INLINE void traverse(const WideNode* nodes, const TriangleBlock* blocks, con
     if (ref & LSP_LEAF_BIT) {
       const TriangleBlock* block = blocks + (ref & LSP_LEAF_FIRST_MASK);
       const uint32_t count = ((ref >> LSP_LEAF_COUNT_SHIFT) & LSP_LEAF_COUNT_MASK) + 1;
-      for (uint32_t i = 0; i < count; ++i) hit_block(block[i], s, frame, best);
+      for (uint32_t i = 0; i < count; ++i) hit_block(block[i], partial, s, frame, best);
       if (kAny && best.triangle != LSP_NONE) return;
     } else {
       const WideNode& node = nodes[ref];
@@ -193,6 +196,8 @@ void trace_rays(const WideTree& tree, bool any, std::span<const LspRay> rays, st
   const lsp_scene& scene = tree.scene();
   const WideNode* nodes = tree.nodes().data();
   const TriangleBlock* blocks = tree.blocks().data();
+  const bool any_partial = (scene.header->required_features & LSP_FEATURE_COVERAGE) != 0;
+  const LspTriangle* partial = any_partial ? scene.triangles : nullptr;
   wide::Text text;
   for (size_t i = 0; i < rays.size(); ++i) {
     const LspSetup s = text.lsp_setup(scene, rays[i]);
@@ -202,9 +207,9 @@ void trace_rays(const WideTree& tree, bool any, std::span<const LspRay> rays, st
     }
     LspBest best = text.lsp_no_best(s);
     if (any)
-      traverse<true>(nodes, blocks, s, best);
+      traverse<true>(nodes, blocks, partial, s, best);
     else
-      traverse<false>(nodes, blocks, s, best);
+      traverse<false>(nodes, blocks, partial, s, best);
     best.complete = true;
     hits[i] = text.lsp_finish(scene, s, rays[i], best);
   }

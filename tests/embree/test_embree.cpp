@@ -176,6 +176,57 @@ INSTANTIATE_TEST_SUITE_P(Embree, ClosedMesh,
                                          "hard/common/nefertiti.obj"),
                          scene_name);
 
+// Leaves that are there in part, some on a floor's edges: Embree passes those that a filter says.
+TEST(Partial, ExactAgreesWithEmbree) {
+  const fs::path path = fs::path(LSP_BAKES_DIR) / "leaves.obj";
+  fs::create_directories(path.parent_path());
+  std::ofstream materials(fs::path(path).replace_extension(".mtl"));
+  std::ofstream out(path);
+  out << "mtllib leaves.mtl\n";
+  Random random(7);
+  const auto between = [&](double lo, double hi) { return lo + (hi - lo) * random.uniform(); };
+  size_t vertices = 0;
+  for (const double share : {1.0, 0.05, 0.3, 0.6, 0.95}) {
+    materials << "newmtl m" << share << "\nd " << share << "\n";
+    out << "usemtl m" << share << "\n";
+    for (int i = 0; i < 2000; ++i) {
+      const double at[3] = {between(-1, 1), between(-1, 1), between(-1, 1)};
+      for (int corner = 0; corner < 3; ++corner) {
+        out << "v";
+        for (const double x : at) out << " " << x + between(-0.1, 0.1);
+        out << "\n";
+      }
+      out << "f " << vertices + 1 << " " << vertices + 2 << " " << vertices + 3 << "\n";
+      vertices += 3;
+    }
+  }
+  materials.close();
+  out.close();
+  for (const char* base : {"bvh", "ntree"}) {
+    const OpenFile file(shared_bake(path, {"--no-line-spaces", "--base", base}, LSP_BAKES_DIR));
+    const Soup soup = soup_of(file.scene());
+    ASSERT_FALSE(soup.gaps.empty());
+    const EmbreeScene embree(soup);
+    const std::vector<LspRay> rays = surface_rays(soup, rays_per_scene(), 1);
+    const std::vector<LspHit> ours = traced(file, {}, rays), reference = reference_hits(embree, rays);
+    const Agreement agreement = compare_exact(soup, rays, ours, reference);
+    EXPECT_LT(agreement.beyond_ties(), rays.size() / 50000);
+    EXPECT_EQ(agreement.ours_wrong + agreement.both_wrong, 0u);
+    // All in all they pass a few leaves each.
+    size_t passed = 0, differ = 0;
+    Soup solid = soup;
+    solid.gaps.clear();
+    const std::vector<LspHit> first = reference_hits(EmbreeScene(solid), rays);
+    const std::vector<LspHit> any = traced(file, {.any = true}, rays);
+    for (size_t i = 0; i < rays.size(); ++i) {
+      passed += first[i].primitive != ours[i].primitive;
+      differ += (any[i].primitive == LSP_NONE) != (ours[i].primitive == LSP_NONE);
+    }
+    EXPECT_GT(passed, rays.size() / 4);
+    EXPECT_EQ(differ, 0u);
+  }
+}
+
 // Closed meshes made here, so that the test runs anywhere: far from the origin, tiny, and with walls of zero
 // thickness along the axes.
 fs::path write_off(const std::string& name, const std::vector<glm::vec3>& vertices,

@@ -162,7 +162,7 @@ void complete(Parts& parts, const BuildOptions& options, uint32_t leaves) {
   h.magic_0 = LSP_MAGIC_0;
   h.magic_1 = LSP_MAGIC_1;
   h.version_major = LSP_VERSION_MAJOR;
-  h.version_minor = LSP_VERSION_MINOR;
+  h.version_minor = lsp_version_minor(h.required_features);
   h.header_bytes = sizeof(LspHeader);
   h.section_table_offset = sizeof(LspHeader);
   h.alignment = options.alignment;

@@ -34,6 +34,7 @@ uint32_t CellAnswers::plane_of(uint32_t triangle) {
   const glm::dvec3 normal = length > 0 ? area / length : glm::dvec3(0, 0, 1);
   const Plane plane = {glm::vec3(normal), float(glm::dot(normal, a - glm::dvec3(centre_)))};
   for (uint32_t k = 0; k < planes_.size(); ++k) {
+    if ((triangles_[plane_records_[k]].flags ^ t.flags) >> LSP_TRIANGLE_GAPS_SHIFT != 0) continue;
     const float same = glm::dot(planes_[k].normal, plane.normal);
     if (std::fabs(same) > kSameDirection &&
         std::fabs(planes_[k].distance - std::copysign(plane.distance, plane.distance * same)) <

@@ -17,7 +17,8 @@ class CellAnswers {
   CellAnswers(std::span<const LspTriangle> triangles, std::span<const uint32_t> records,
               const glm::vec3& centre, float cell_size);
 
-  // The plane of a triangle, which counts within the cell; those of coplanar ones are one.
+  // The plane of a triangle, which counts within the cell; those of coplanar ones with the same gaps are one.
+  // Which rays pass a triangle with gaps the tracer decides: to tables all are solid.
   uint32_t plane_of(uint32_t triangle);
   std::span<const Plane> planes() const { return planes_; }
 

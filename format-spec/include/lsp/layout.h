@@ -37,7 +37,7 @@ typedef struct lsp_float3 {
 
 /* Version of the format (not of the programs). A reader refuses another major version. */
 #define LSP_VERSION_MAJOR 2u
-#define LSP_VERSION_MINOR 0u
+#define LSP_VERSION_MINOR 1u
 
 /* First eight bytes: 89 'L' 'S' 'P' 0D 0A 1A 0A, as two little-endian words. Catches text-mode transfers. */
 #define LSP_MAGIC_0 0x50534C89u
@@ -53,7 +53,8 @@ typedef struct lsp_float3 {
 #define LSP_FEATURE_NTREE 0x10u      /* the base structure is an NTree */
 #define LSP_FEATURE_BINARY 0x20u     /* some Line Space has bits but no candidates */
 #define LSP_FEATURE_CELLS 0x40u      /* approximate rays are answered by cells */
-#define LSP_FEATURES_KNOWN 0x7Fu
+#define LSP_FEATURE_COVERAGE 0x80u   /* some triangle is there in part: LSP_TRIANGLE_GAPS_SHIFT */
+#define LSP_FEATURES_KNOWN 0xFFu
 
 /* Base structures. */
 #define LSP_BASE_BVH 1u
@@ -61,6 +62,11 @@ typedef struct lsp_float3 {
 #define LSP_BASE_CELLS 3u /* cells, and for exact rays a BVH */
 
 #ifndef GL_core_profile
+/* The minor version to write: the lowest that knows these required features. */
+static inline uint32_t lsp_version_minor(uint32_t required_features) {
+  return (required_features & LSP_FEATURE_COVERAGE) != 0 ? LSP_VERSION_MINOR : 0u;
+}
+
 /* Section types, LSP_SECTION_NODE and so on: four characters each, the first in the low byte. */
 #define LSP_FOUR(a, b, c, d) ((a) | (b) << 8 | (c) << 16 | (d) << 24)
 enum {
@@ -329,6 +335,10 @@ LSP_BEGIN(LspTriangle)
 LSP_END(LspTriangle)
 
 #define LSP_TRIANGLE_SMOOTH 0x1u /* the corner normals differ from one another */
+/* Bits 16-31, with LSP_FEATURE_COVERAGE: so many of 65536 rays pass the triangle, which is there in part; 0:
+ * it is solid. Which rays pass, a hash of ray and primitive says (lsp_passes in lsp/traverse.h). */
+#define LSP_TRIANGLE_GAPS_SHIFT 16u
+#define LSP_TRIANGLE_MAX_GAPS 0xFFFFu
 
 /* Unit normals of the corners, octahedral, two 16-bit snorm each (x low, y high); Cigolle et al. 2014. */
 LSP_BEGIN(LspCornerNormals)

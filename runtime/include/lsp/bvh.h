@@ -91,10 +91,11 @@ LSP_STEP LspNext lsp_pop_where_none(LspNext next, float best_t) {
   return next;
 }
 
-/* Steps that a ray takes at most: what max_steps counts and, where they are asked, the Line Spaces it begins
- * in. */
+/* Steps that a ray takes at most: what max_steps counts and, where their nodes may follow, the Line Spaces it
+ * asks. */
 LSP_FN uint lsp_most_steps(LspScene scene, LspQuery q) {
-  uint asked = (q.flags & LSP_TRACE_NEAR_SKIP) != 0u ? lsp_load_header(scene).line_space_count : 0u;
+  bool follow = (q.flags & LSP_TRACE_NEAR_SKIP) != 0u || (LSP_PARTS & LSP_PART_COVERAGE) != 0u;
+  uint asked = follow ? lsp_load_header(scene).line_space_count : 0u;
   return lsp_load_header(scene).max_steps + asked;
 }
 

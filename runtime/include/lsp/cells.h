@@ -261,10 +261,27 @@ LSP_STEP void lsp_advance(LspScene scene, LspSetup s, LspQuery q) {
           precise vec3 origin = r.origin - (corner + 0.5f);
           float hit = lsp_cell_meet(lsp_load_plane(scene, plane), origin, r.direction, begins, t, t_out);
           if (hit > s.tmin && hit < s.tmax) {
-            lsp_walk.best.t = hit;
-            lsp_walk.best.triangle = lsp_load_plane_record(scene, plane);
-            lsp_walk.best.flags = LSP_HIT_LINE_SPACE | (begins ? LSP_HIT_ORIGIN_INSIDE : 0u);
+            uint record = lsp_load_plane_record(scene, plane);
             over = true;
+            if ((LSP_PARTS & LSP_PART_COVERAGE) != 0u) {
+              LspTriangle tri = lsp_load_triangle(scene, record);
+              if (lsp_has_gaps(tri)) {
+                /* As a Line Space's candidate that is there in part: the cell is traced exactly; from tables
+                 * alone the ray either meets the plane or goes on to the next cell. */
+                bool exactly = (LSP_PARTS & LSP_PART_CELL_EXACT) != 0u && q.dial != LSP_DIAL_TABLES;
+                over = !exactly && !lsp_passes(s, tri);
+                if (exactly) {
+                  exact = index;
+                  lsp_walk.exact_cell = cell;
+                  lsp_walk.exact_t = t;
+                }
+              }
+            }
+            if (over) {
+              lsp_walk.best.t = hit;
+              lsp_walk.best.triangle = record;
+              lsp_walk.best.flags = LSP_HIT_LINE_SPACE | (begins ? LSP_HIT_ORIGIN_INSIDE : 0u);
+            }
           }
         }
       } else {

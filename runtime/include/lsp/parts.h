@@ -8,5 +8,6 @@
 #define LSP_PART_NORMAL_ANGLE 0x2u    /* header.normal_angle_cos is a limit */
 #define LSP_PART_PLANE_TOLERANCE 0x4u /* header.plane_tolerance is not 0 */
 #define LSP_PART_CELL_EXACT 0x8u      /* Cells: any dial but LSP_DIAL_TABLES; without it tables alone answer */
+#define LSP_PART_COVERAGE 0x10u       /* triangles that are there in part: LSP_FEATURE_COVERAGE */
 
 #endif

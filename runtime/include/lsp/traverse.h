@@ -92,6 +92,7 @@ struct LspSetup {
   float to_scaled; /* t (scaled) = t (given) * to_scaled */
   float to_given;
   int axis;   /* of the largest component of direction */
+  uint hash;  /* lsp_ray_hash; with LSP_PART_COVERAGE alone */
   bool valid; /* else nothing but this is set */
 };
 
@@ -161,6 +162,38 @@ LSP_FN vec3 lsp_rotate(vec3 v, int axis) {
   return axis == 2 ? v : (axis == 0 ? vec3(v.y, v.z, v.x) : vec3(v.z, v.x, v.y));
 }
 
+/* A step of MurmurHash3 (Appleby 2011), and its end, after which every bit depends on all that went in. */
+LSP_FN uint lsp_hash_step(uint hash, uint word) {
+  word *= 0xCC9E2D51u;
+  word = ((word << 15u) | (word >> 17u)) * 0x1B873593u;
+  hash ^= word;
+  return ((hash << 13u) | (hash >> 19u)) * 5u + 0xE6546B64u;
+}
+LSP_FN uint lsp_hash_end(uint hash) {
+  hash = (hash ^ (hash >> 16u)) * 0x85EBCA6Bu;
+  hash = (hash ^ (hash >> 13u)) * 0xC2B2AE35u;
+  return hash ^ (hash >> 16u);
+}
+
+/* Of the bits of origin and direction, not the interval: a ray that goes on behind a hit is the same one. */
+LSP_FN uint lsp_ray_hash(LspRay ray) {
+  uint hash = 0u;
+  hash = lsp_hash_step(hash, floatBitsToUint(ray.origin.x));
+  hash = lsp_hash_step(hash, floatBitsToUint(ray.origin.y));
+  hash = lsp_hash_step(hash, floatBitsToUint(ray.origin.z));
+  hash = lsp_hash_step(hash, floatBitsToUint(ray.direction.x));
+  hash = lsp_hash_step(hash, floatBitsToUint(ray.direction.y));
+  return lsp_hash_step(hash, floatBitsToUint(ray.direction.z));
+}
+
+LSP_FN bool lsp_has_gaps(LspTriangle tri) { return (tri.flags >> LSP_TRIANGLE_GAPS_SHIFT) != 0u; }
+
+/* Whether a triangle that is there in part is not there for this ray. It is asked of every record and cell
+ * that holds the triangle, and answers the same each time. */
+LSP_FN bool lsp_passes(LspSetup s, LspTriangle tri) {
+  return (lsp_hash_end(lsp_hash_step(s.hash, tri.primitive)) >> 16u) < (tri.flags >> LSP_TRIANGLE_GAPS_SHIFT);
+}
+
 /* Invalid are a NaN anywhere, a non-finite origin or direction, a direction of zero or of denormal length,
  * and tmin > tmax. */
 LSP_FN LspSetup lsp_setup(LspScene scene, LspRay ray) {
@@ -207,6 +240,7 @@ LSP_FN LspSetup lsp_setup(LspScene scene, LspRay ray) {
   s.shear = shear;
   precise float len = sqrt(lsp_dot(s.direction, s.direction));
   s.speed = len;
+  if ((LSP_PARTS & LSP_PART_COVERAGE) != 0u) s.hash = lsp_ray_hash(ray);
   s.valid = true;
   return s;
 }
@@ -287,6 +321,7 @@ LSP_FN LspBest lsp_triangle(LspScene scene, LspSetup s, uint index, LspBest best
   if (det == 0.0f || !lsp_is_finite(det)) return best;
   float t = lsp_plane_depth(lsp_rotate(s.direction, s.axis), s.shear.z, a, b, c);
   if (t > s.tmin && t < best.t) {
+    if ((LSP_PARTS & LSP_PART_COVERAGE) != 0u && lsp_passes(s, tri)) return best;
     best.t = t;
     precise float weight1 = v / det; /* not by 1 / det: det may be so small that it is infinite */
     precise float weight2 = w / det;
@@ -585,8 +620,21 @@ LSP_STEP void lsp_answer(LspScene scene, LspSetup s, LspQuery q, LspLineSpace ls
     lsp_walk.ref = freely ? LSP_NONE : ls.child;
     return;
   }
-  if (candidate != LSP_NONE) lsp_walk.best = lsp_hit_candidate(scene, s, ls, pass, candidate, lsp_walk.best);
   lsp_walk.ref = LSP_NONE;
+  if (candidate == LSP_NONE) return;
+  LspBest best = lsp_hit_candidate(scene, s, ls, pass, candidate, lsp_walk.best);
+  if ((LSP_PARTS & LSP_PART_COVERAGE) != 0u && !lsp_is_binary(ls)) {
+    LspTriangle tri = lsp_load_triangle(scene, candidate);
+    if (lsp_has_gaps(tri)) {
+      /* A candidate that is there in part says nothing of what lies behind it, and a ray that passes it would
+       * be stopped a second time by the neighbour that it stands for, too: the ray goes on into the node. */
+      lsp_walk.ref = ls.child;
+      if (lsp_walk.ref != LSP_NONE) return;
+      /* Of an approximate file there is nothing more. */
+      if (lsp_passes(s, tri)) best = lsp_walk.best;
+    }
+  }
+  lsp_walk.best = best;
 }
 
 LSP_STEP void lsp_look_up(LspScene scene, LspSetup s, LspQuery q) {
