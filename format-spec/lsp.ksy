@@ -367,7 +367,7 @@ types:
         type: vec3
       - id: flags
         type: u4
-        doc: Bit 0, SMOOTH. Bits 16 to 31, GAPS: so many of 65536 rays pass.
+        doc: Bit 0 is SMOOTH; bits 16 to 31 are the gaps, so many of 65536 rays pass.
   corner_normals:
     seq:
       - id: elements
