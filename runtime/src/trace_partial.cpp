@@ -1,6 +1,0 @@
-// The tracers of scenes with LSP_FEATURE_COVERAGE: the text of the others with every part.
-#define LSP_VARIANT partial
-
-#include "trace_bvh.cpp"
-#include "trace_cells.cpp"
-#include "trace_ntree.cpp"
