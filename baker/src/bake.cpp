@@ -269,7 +269,7 @@ Baked bake(const Mesh& mesh, const BakeOptions& asked, const Progress& progress)
                              ? LSP_FEATURE_BINARY
                              : 0);
   set_counts(baked);
-  if (cells) choose_dial(baked);
+  if (cells) choose_dial(baked, options.cells_wrong);
   return baked;
 }
 

@@ -147,6 +147,13 @@ TEST_F(LspBake, EveryFileReadIsInTheHashAndTheDepfile) {
 TEST_F(LspBake, KeepsWhatTheErrorAllows) {
   ASSERT_EQ(run("grid.obj -o a.lsp --max-error 20 --json"), 0);
   EXPECT_LE(nlohmann::json::parse(read("out"))["error"]["wrong_percent"], 20.0);
+  // Of cells it is the point of the dial that is chosen.
+  for (const double allowed : {20.0, 0.5}) {
+    ASSERT_EQ(run("grid.obj -o b.lsp --base cells --cells 4 --preset fast --json --max-error " +
+                  std::to_string(allowed)),
+              0);
+    EXPECT_LE(nlohmann::json::parse(read("out"))["error"]["wrong_percent"], allowed);
+  }
 }
 
 TEST_F(LspBake, WritesBinaryLineSpacesOfEveryKind) {

@@ -86,15 +86,15 @@ DialError measure(const lsp_scene& scene, const Rays& set, double diagonal) {
   return error;
 }
 
-bool within(const DialError& e, double share) {
-  return e.wrong <= 0.01 * share && e.depth <= 0.01 * share && e.picture <= 0.03 * share;
+bool within(const DialError& e, double wrong) {
+  return e.wrong <= wrong && e.depth <= wrong && e.picture <= 3 * wrong;
 }
 
-// The cheapest dial that keeps within a share of the errors that balanced may have. The more of the origin
+// The cheapest dial that keeps within errors. The more of the origin
 // tables is heeded, the less of the far tables can be: a walk along the border of what is within. Tries dials
 // in the header's `balanced`.
 uint32_t cheapest(const lsp_scene& scene, LspHeader& header, const std::array<Rays, 2>& sets, double diagonal,
-                  double share) {
+                  double wrong) {
   constexpr uint32_t kClasses[] = {0, 1, 2, 3, 4, 5, 6, LSP_LOSS_UNKNOWN + 1};
   uint32_t best = LSP_DIAL(0u, 0u);
   double least = INFINITY;
@@ -106,7 +106,7 @@ uint32_t cheapest(const lsp_scene& scene, LspHeader& header, const std::array<Ra
     for (const Rays& set : sets) {
       const DialError error = measure(scene, set, diagonal);
       cost = std::max(cost, error.cost);
-      kept = kept && within(error, share);
+      kept = kept && within(error, wrong);
       if (!kept) break;
     }
     if (kept && cost < least) {
@@ -123,7 +123,7 @@ uint32_t cheapest(const lsp_scene& scene, LspHeader& header, const std::array<Ra
 
 }  // namespace
 
-void choose_dial(Baked& baked) {
+void choose_dial(Baked& baked, double wrong) {
   LspHeader& h = baked.header;
   for (uint32_t& dial : h.quality) dial = LSP_DIAL_TABLES;
   if (baked.cell_tables.nodes.empty() && baked.cell_tables.references.empty()) return;
@@ -136,8 +136,8 @@ void choose_dial(Baked& baked) {
   lsp_trace_counts ignored{};
   for (Rays& set : sets) set.truth = trace(scene, {0, 0, 0, 0}, set.rays, &ignored);
 
-  const uint32_t accurate = cheapest(scene, h, sets, diagonal, 0.5);
-  h.quality[LSP_QUALITY_BALANCED] = cheapest(scene, h, sets, diagonal, 1);
+  const uint32_t accurate = cheapest(scene, h, sets, diagonal, 0.5 * wrong);
+  h.quality[LSP_QUALITY_BALANCED] = cheapest(scene, h, sets, diagonal, wrong);
   h.quality[LSP_QUALITY_ACCURATE] = accurate;
 }
 

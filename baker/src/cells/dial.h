@@ -6,9 +6,9 @@
 namespace lsp {
 
 // Measures the dial, on rays that trained nothing, from the surfaces and from what eyes in the scene see, and
-// writes header.quality: fast answers from tables alone, balanced errs at most 1 % of
-// rays, 1 % in depth and 3 % in ambient occlusion, accurate half of that; each is the cheapest dial that
-// does, or the finest.
-void choose_dial(Baked& baked);
+// writes header.quality: fast answers from tables alone, balanced errs at most `wrong` (a share) of the rays,
+// as much in depth and three times as much in ambient occlusion, accurate half of that; each is the cheapest
+// dial that does, or the finest.
+void choose_dial(Baked& baked, double wrong);
 
 }  // namespace lsp
