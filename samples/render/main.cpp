@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "heat.h"
 #include "lsp/command_line.h"
 #include "lsp/lsp_vulkan.h"
 #include "lsp/trace_arguments.hpp"
@@ -18,6 +19,7 @@ struct Arguments {
   std::string file;
   std::vector<std::string> outputs;
   std::string effect = "all";
+  std::string heat;
   std::string mode = "exact";
   TraceArguments trace;
   std::string camera;
@@ -58,6 +60,40 @@ Effect parse_effect(const std::string& name) {
   if (name == "diffuse") return Effect::kDiffuse;
   if (name == "glossy") return Effect::kGlossy;
   return Effect::kAll;
+}
+
+Heat parse_heat(const std::string& name) {
+  return name == "loss" ? Heat::kLoss : name == "steps" ? Heat::kSteps : Heat::kExact;
+}
+
+// --heat: a map in place of the picture.
+void run_heat(const Arguments& arguments, const CommonOptions& common, const RenderScene& scene,
+              const Camera& camera, const RenderOptions& options) {
+  const bool show_progress = !common.quiet && isatty(STDERR_FILENO) != 0;
+  const HeatMap map = heat_map(scene, camera,
+                               {parse_heat(arguments.heat), options.indirect, options.width, options.height,
+                                options.samples, options.threads},
+                               [&](double done) {
+                                 if (show_progress) std::fprintf(stderr, "\rheat %3.0f %%", 100.0 * done);
+                               });
+  if (show_progress) std::fprintf(stderr, "\r               \r");
+  for (const std::string& output : arguments.outputs) {
+    const bool colors = std::filesystem::path(output).extension() == ".png";
+    write_picture(output, colors ? in_colors(map) : map.values, Transfer::kDisplay);
+  }
+  if (common.json) {
+    std::cout << nlohmann::ordered_json{{"file", arguments.file},     {"outputs", arguments.outputs},
+                                        {"heat", arguments.heat},     {"mode", arguments.mode},
+                                        {"width", options.width},     {"height", options.height},
+                                        {"samples", options.samples}, {"camera", to_string(camera)},
+                                        {"mean", map.mean},           {"white", map.top}}
+                     .dump(2)
+              << "\n";
+  } else if (!common.quiet) {
+    std::printf("%s: heat of %s, %d x %d, %u samples: mean %.4g a ray, white is %.4g; camera %s\n",
+                arguments.outputs.front().c_str(), arguments.heat.c_str(), options.width, options.height,
+                options.samples, map.mean, static_cast<double>(map.top), to_string(camera).c_str());
+  }
 }
 
 double mega(uint64_t rays, double seconds) {
@@ -117,6 +153,7 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
     }
   }
 
+  if (!arguments.heat.empty()) return run_heat(arguments, common, scene, camera, options);
   const bool show_progress = !common.quiet && isatty(STDERR_FILENO) != 0;
   RenderReport report;
   const Picture picture = render(scene, sky, camera, options, *tracer, report, [&](double done) {
@@ -189,6 +226,11 @@ int main(int argc, char** argv) {
       ->allow_extra_args(false);
   app.add_option("--effect", a.effect, "ao, diffuse, glossy, all or direct (default all)")
       ->check(CLI::IsMember({"ao", "diffuse", "glossy", "all", "direct"}));
+  app.add_option("--heat", a.heat,
+                 "A map in place of the picture, black to white: loss (where rays are wrong), steps (where "
+                 "work goes) "
+                 "or exact (where tables are not heeded); .pfm keeps the numbers")
+      ->check(CLI::IsMember({"loss", "steps", "exact"}));
   app.add_option("--mode", a.mode, "exact or approximate (default exact)")
       ->check(CLI::IsMember({"exact", "approximate"}));
   add_trace_arguments(app, a.trace);
@@ -199,7 +241,7 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1u, 1u << 20));
   app.add_option("--bounces", a.options.bounces, "Bounces of indirect light (default 1)")
       ->check(CLI::Range(1, 16));
-  app.add_option("--ao-distance", a.options.ao_distance,
+  app.add_option("--radius,--ao-distance", a.options.ao_distance,
                  "Reach of --effect ao in diagonals of the scene (default 0.1)")
       ->check(CLI::Range(1e-6f, 1e6f));
   app.add_flag("--denoise", a.options.denoise, "Filter the noise of few samples out of the picture");
@@ -214,8 +256,8 @@ int main(int argc, char** argv) {
       app, "lsp-render room.lsp -o room.png --effect diffuse --mode approximate",
       {{"What most people need",
         {"FILE.lsp", "--output FILE", "--effect", "--mode", "--camera EYE:TARGET:ANGLE", "--samples"}},
-       {"The picture", {"--size WxH", "--exposure STOPS", "--denoise"}},
-       {"Light", {"--bounces", "--ao-distance", "--sun X,Y,Z"}},
+       {"The picture", {"--size WxH", "--exposure STOPS", "--denoise", "--heat"}},
+       {"Light", {"--bounces", "--radius", "--sun X,Y,Z"}},
        {"Approximate mode", {"--near", "--lod", "--quality", "--max-loss PERCENT"}},
        {"The machine", {"--backend", "--threads"}}});
   return run_program(kProgram, app, argc, argv, [&] { run(a, common, kProgram); });

@@ -101,6 +101,20 @@ void RenderScene::find_emitters() {
   }
 }
 
+glm::vec3 RenderScene::lifted(const SurfacePoint& point) const {
+  const float offset = 3e-5f * diagonal();
+  return point.position + offset * point.geometric_normal;
+}
+
+LspRay RenderScene::ray_from(const SurfacePoint& point, glm::vec3 direction, float tmax) const {
+  return {from_glm(lifted(point)), 0.0f, from_glm(direction), tmax};
+}
+
+glm::vec3 above(const SurfacePoint& point, glm::vec3 direction) {
+  const float depth = glm::dot(direction, point.geometric_normal);
+  return depth < 0 ? direction - 2.0f * depth * point.geometric_normal : direction;
+}
+
 EmitterPoint RenderScene::sample_emitter(float chance, glm::vec2 point) const {
   const auto found = std::lower_bound(emitters_.begin(), emitters_.end() - 1, chance,
                                       [](const Emitter& e, float value) { return e.cumulative <= value; });

@@ -49,6 +49,10 @@ class RenderScene {
   // The point that `ray` hits; `hit` must be a hit of this scene.
   SurfacePoint surface(const LspRay& ray, const LspHit& hit) const;
 
+  // A little above the surface, on the side that it was seen from, and a ray that leaves from there.
+  glm::vec3 lifted(const SurfacePoint& point) const;
+  LspRay ray_from(const SurfacePoint& point, glm::vec3 direction, float tmax) const;
+
   bool has_emitters() const { return !emitters_.empty(); }
   // `chance` picks the triangle, `point` the place on it; all in [0, 1).
   EmitterPoint sample_emitter(float chance, glm::vec2 point) const;
@@ -89,6 +93,9 @@ struct Sky {
 void make_frame(glm::vec3 n, glm::vec3& tangent, glm::vec3& bitangent);
 // A cosine-distributed direction about unit `n`.
 glm::vec3 cosine_direction(glm::vec3 n, glm::vec2 random);
+
+// A direction that the shading normal allows but that runs into the surface is mirrored out of it.
+glm::vec3 above(const SurfacePoint& point, glm::vec3 direction);
 
 inline glm::vec3 to_glm(lsp_float3 v) { return {v.x, v.y, v.z}; }
 inline lsp_float3 from_glm(glm::vec3 v) { return {v.x, v.y, v.z}; }

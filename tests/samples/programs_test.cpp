@@ -106,6 +106,22 @@ TEST_F(Programs, VulkanGivesTheSamePicture) {
   }
 }
 
+TEST_F(Programs, HeatIsWhereTablesLoseAndWorkGoes) {
+  const auto total = [](const Picture& picture) {
+    double sum = 0;
+    for (const glm::vec3& pixel : picture.pixels) sum += static_cast<double>(pixel.x);
+    return sum;
+  };
+  EXPECT_EQ(total(render("spheres", "none", "--heat loss --mode exact")), 0.0);
+  EXPECT_GT(total(render("spheres", "loss", "--heat loss --mode approximate --near approximate")), 0.0);
+  const Picture exact = render("spheres", "exact", "--heat steps --mode exact");
+  const Picture approximate =
+      render("spheres", "approximate", "--heat steps --mode approximate --near approximate");
+  EXPECT_GT(total(exact), total(approximate));
+  EXPECT_GT(total(render("spheres", "triangles", "--heat exact --mode exact")), 0.0);
+  EXPECT_EQ(run("lsp-render " + file("spheres.lsp") + " -o " + file("x.png") + " --heat cold --quiet"), 1);
+}
+
 TEST_F(Programs, CompareExitsWith7WhereTheyDiffer) {
   render("spheres", "a", "--effect direct");
   render("spheres", "b", "--effect ao");
