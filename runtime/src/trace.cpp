@@ -6,7 +6,7 @@
 
 extern "C" uint32_t lsp_dial(const lsp_scene* scene, const lsp_trace_options* options) {
   // Without their triangles cells answer from tables alone.
-  if (scene->cell_nodes == nullptr) return LSP_DIAL_TABLES;
+  if (scene->cell_references == nullptr) return LSP_DIAL_TABLES;
   if ((options->flags & LSP_TRACE_MAX_LOSS) == 0)
     return scene->header
         ->quality[options->quality < LSP_QUALITY_COUNT ? options->quality : LSP_QUALITY_BALANCED];

@@ -103,7 +103,7 @@ extern "C" uint32_t lsp_vulkan_parts(const lsp_scene* scene) {
   if ((header.required_features & LSP_FEATURE_BINARY) != 0) parts |= LSP_PART_BINARY;
   if (header.normal_angle_cos > -1.0f) parts |= LSP_PART_NORMAL_ANGLE;
   if (header.plane_tolerance > 0.0f) parts |= LSP_PART_PLANE_TOLERANCE;
-  if (scene->cell_nodes != nullptr) parts |= LSP_PART_CELL_EXACT;
+  if (scene->cell_references != nullptr) parts |= LSP_PART_CELL_EXACT;
   if ((header.required_features & LSP_FEATURE_COVERAGE) != 0) parts |= LSP_PART_COVERAGE;
   return parts;
 }

@@ -26,9 +26,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A ball in a room of single-sheet walls.
-Mesh room() {
-  Mesh mesh = sphere(24);
+void add_walls(Mesh& mesh) {
   for (int axis = 0; axis < 3; ++axis)
     for (const float side : {-2.5f, 2.5f}) {
       const auto corner = [&](float u, float v) {
@@ -48,6 +46,12 @@ Mesh room() {
         add_triangle(mesh, a, c, d);
       }
     }
+}
+
+// A ball in a room of single-sheet walls.
+Mesh room() {
+  Mesh mesh = sphere(24);
+  add_walls(mesh);
   return mesh;
 }
 
@@ -167,6 +171,40 @@ TEST(Cells, RaysFromOutsideAndFromEmptyCells) {
   const auto truth = trace(scene, {0, 0}, rays);
   EXPECT_LT(wrong_share(trace(scene, tables_but(0), rays), truth), 0.005);
   EXPECT_LT(wrong_share(trace(scene, tables_but(100), rays), truth), 0.05);
+}
+
+// Probes of light and cameras stand where no surface is, in cells that hold some.
+TEST(Cells, RaysFromWhereNoSurfaceIs) {
+  const lsp_scene scene = view(baked_room());
+  std::vector<LspRay> rays = surface_rays(baked_room(), 8000, 1);
+  uint32_t state = 1;
+  const auto next = [&] {
+    state = state * 1664525u + 1013904223u;
+    return float(state >> 8) * 0x1p-24f;
+  };
+  for (LspRay& r : rays) {
+    glm::vec3 p;
+    do p = 4.8f * glm::vec3(next(), next(), next()) - 2.4f;
+    while (glm::length(p) < 1.1f);
+    r.origin = {p.x, p.y, p.z};
+  }
+  const auto truth = trace(scene, {0, 0}, rays);
+  const auto wrong = [&](const lsp_trace_options& options) {
+    return wrong_share(trace(scene, options, rays), truth);
+  };
+  EXPECT_LT(wrong({LSP_TRACE_APPROXIMATE, 0, LSP_QUALITY_BALANCED}), 0.025);
+  EXPECT_LT(wrong({LSP_TRACE_APPROXIMATE, 0, LSP_QUALITY_ACCURATE}), 0.015);
+  EXPECT_LT(wrong(tables_but(100)), 0.03);
+
+  // The corner of all eight cells of an empty box.
+  Mesh walls;
+  add_walls(walls);
+  BakeOptions options = options_of_cells();
+  options.cells = 2;
+  const lsp::Baked box = bake(walls, options);
+  for (LspRay& r : rays) r.origin = {0, 0, 0};
+  for (const lsp_trace_options& o : {lsp_trace_options{LSP_TRACE_APPROXIMATE, 0}, tables_but(100)})
+    EXPECT_LT(wrong_share(trace(view(box), o, rays), trace(view(box), {0, 0}, rays)), 0.01);
 }
 
 TEST(Cells, TablesAloneNeedNoTriangles) {

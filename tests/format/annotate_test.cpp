@@ -46,9 +46,9 @@ TEST(Annotate, EveryByteOfEveryPrefix) {
 }
 
 TEST(Annotate, EveryByteOfDamagedFiles) {
-  const Bytes good[] = {encode(full_scene()), encode(full_ntree_scene())};
+  const Bytes good[] = {encode(full_scene()), encode(full_ntree_scene()), encode(full_cells_scene())};
   for (uint64_t seed = 0; seed < 10000; ++seed) {
-    Bytes bytes = good[seed % 2];
+    Bytes bytes = good[seed % 3];
     Random random(seed);
     mutate(bytes, random);
     expect_all_accounted(bytes, "seed " + std::to_string(seed));
@@ -102,9 +102,9 @@ TEST(Info, SaysWhatCellsAre) {
 }
 
 TEST(Info, SummarisesDamagedFiles) {
-  const Bytes good[] = {encode(full_scene()), encode(full_ntree_scene())};
+  const Bytes good[] = {encode(full_scene()), encode(full_ntree_scene()), encode(full_cells_scene())};
   for (uint64_t seed = 0; seed < 10000; ++seed) {
-    Bytes bytes = good[seed % 2];
+    Bytes bytes = good[seed % 3];
     Random random(seed);
     mutate(bytes, random);
     try {

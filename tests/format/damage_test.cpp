@@ -3,6 +3,7 @@
 
 #include <cstring>
 
+#include "cells_scenes.h"
 #include "check.h"
 #include "image.h"
 #include "ntree_scenes.h"
@@ -19,11 +20,11 @@ Report check_exact(const Bytes& bytes, Level level = Level::kGeometry) {
   return check_file(Bytes(bytes), {.level = level, .memory_limit = uint64_t{1} << 26});
 }
 
-// Both base structures: every test below runs on the full scene of each.
-std::vector<Image> full_scenes() { return {full_scene(), full_ntree_scene()}; }
+// Of every base structure: every test below runs on the full scene of each.
+std::vector<Image> full_scenes() { return {full_scene(), full_ntree_scene(), full_cells_scene()}; }
 
 TEST(Damage, EveryPrefixOfAValidFileIsRefused) {
-  for (const char* name : {"full", "packed", "ntree-full", "ntree-packed"}) {
+  for (const char* name : {"full", "packed", "ntree-full", "ntree-packed", "cells"}) {
     for (const ValidFile& file : valid_files()) {
       if (file.name != name) continue;
       for (size_t size = 0; size < file.bytes.size(); ++size) {

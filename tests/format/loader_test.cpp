@@ -6,6 +6,7 @@
 #include <cstring>
 #include <set>
 
+#include "cells_scenes.h"
 #include "check.h"
 #include "mutations.h"
 #include "ntree_scenes.h"
@@ -116,7 +117,7 @@ TEST(Loader, AgreesOnTenThousandRandomMutations) {
 }
 
 TEST(Loader, UnpackOfPackIsTheSameFile) {
-  for (Image image : {full_scene(), full_ntree_scene()})
+  for (Image image : {full_scene(), full_ntree_scene(), full_cells_scene()})
     for (uint32_t alignment : {256u, 4096u, 65536u}) {
       image.alignment = alignment;
       const Bytes raw = encode(image);

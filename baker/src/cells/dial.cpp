@@ -95,7 +95,8 @@ bool within(const DialError& e, double wrong) {
 // in the header's `balanced`.
 uint32_t cheapest(const lsp_scene& scene, LspHeader& header, const std::array<Rays, 2>& sets, double diagonal,
                   double wrong) {
-  constexpr uint32_t kClasses[] = {0, 1, 2, 3, 4, 5, 6, LSP_LOSS_UNKNOWN + 1};
+  // What nobody knows is never heeded: rays of other places than these may come there.
+  constexpr uint32_t kClasses[] = {0, 1, 2, 3, 4, 5, 6, LSP_LOSS_UNKNOWN};
   uint32_t best = LSP_DIAL(0u, 0u);
   double least = INFINITY;
   for (size_t near = 0, far = std::size(kClasses); near < std::size(kClasses) && far > 0;) {
@@ -126,7 +127,7 @@ uint32_t cheapest(const lsp_scene& scene, LspHeader& header, const std::array<Ra
 void choose_dial(Baked& baked, double wrong) {
   LspHeader& h = baked.header;
   for (uint32_t& dial : h.quality) dial = LSP_DIAL_TABLES;
-  if (baked.cell_tables.nodes.empty() && baked.cell_tables.references.empty()) return;
+  if (baked.cell_tables.references.empty()) return;
   const double diagonal = glm::length(glm::dvec3(h.bounds_max.x, h.bounds_max.y, h.bounds_max.z) -
                                       glm::dvec3(h.bounds_min.x, h.bounds_min.y, h.bounds_min.z));
   const lsp_scene scene = view(baked);

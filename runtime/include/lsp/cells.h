@@ -172,6 +172,16 @@ LSP_FN LspCellLook lsp_cell_far(LspCellGrid grid, uint index, vec3 from, vec3 to
   return look;
 }
 
+/* The same for a ray that begins within the cell, as if it had begun before it. It leaves the cell at `to`. */
+LSP_FN LspCellLook lsp_cell_through(LspCellGrid grid, uint index, LspCellRay r, ivec3 cell, vec3 to, int axis_out,
+                                    uint face_out) {
+  vec3 corner = lsp_cell_corner(cell);
+  precise vec3 t_side = (lsp_cell_corner(cell + ivec3(1, 1, 1) - r.ahead) - r.origin) * r.inverse;
+  int axis = t_side.x >= t_side.y ? (t_side.x >= t_side.z ? 0 : 2) : (t_side.y >= t_side.z ? 1 : 2);
+  vec3 from = lsp_cell_point(r, lsp_along(t_side, axis)) - corner;
+  return lsp_cell_far(grid, index, from, to, axis, 2u * uint(axis) + 1u - lsp_ahead(r, axis), axis_out, face_out);
+}
+
 LSP_FN float lsp_split_weight(uint bits, uint shift) { return float(int(bits << (26u - shift)) >> 26); }
 
 /* The linear form of a split at a place. */
@@ -246,8 +256,12 @@ LSP_STEP void lsp_advance(LspScene scene, LspSetup s, LspQuery q) {
         look = lsp_cell_origin(scene, grid, index, from, point - corner, axis_out, face_out);
       else
         look = lsp_cell_far(grid, index, from, point - corner, axis, 2u * uint(axis) + 1u - lsp_ahead(r, axis), axis_out, face_out);
-      uint entry = LSP_ANSWER_EMPTY | (begins ? LSP_LOSS_UNKNOWN << LSP_LOSS_SHIFT : 0u);
+      /* Where no surface is near its beginning there is no origin table: nobody knows what the far one loses. */
+      bool unknown = begins && look.entry == LSP_NONE;
+      if (unknown) look = lsp_cell_through(grid, index, r, cell, point - corner, axis_out, face_out);
+      uint entry = LSP_ANSWER_EMPTY;
       if (look.entry != LSP_NONE) entry = lsp_load_entry(scene, look.entry);
+      if (unknown) entry |= LSP_LOSS_UNKNOWN << LSP_LOSS_SHIFT;
       uint answer = entry & LSP_ANSWER_MASK;
       if ((LSP_PARTS & LSP_PART_CELL_EXACT) != 0u && (entry >> LSP_LOSS_SHIFT) >= (begins ? q.dial & 0xFFu : q.dial >> 8u)) {
         exact = index;

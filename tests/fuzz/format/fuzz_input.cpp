@@ -36,7 +36,9 @@ void trace_rays(const lsp_scene& scene, uint64_t seed, size_t count, bool valida
         header.required_features &
         (flags & LSP_TRACE_APPROXIMATE ? LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS | LSP_FEATURE_EXACT
                                        : LSP_FEATURE_EXACT);
-    const lsp_trace_options options{flags, random.unit()};
+    const uint32_t dial = random.below(2) ? LSP_TRACE_MAX_LOSS : 0u;
+    const lsp_trace_options options{flags | dial, random.unit(), uint32_t(random.below(LSP_QUALITY_COUNT)),
+                                    110 * random.unit() - 5};
     lsp_trace_counts counts{};
     const lsp_status status = lsp_trace(&scene, &options, rays.data(), hits.data(), count, nullptr, nullptr);
     if (status != (able ? LSP_OK : LSP_ERROR_UNSUPPORTED))
