@@ -206,12 +206,14 @@ LSP_FN uint lsp_cell_plane(LspScene scene, LspFilledCell cell, uint answer, LspC
 }
 
 /* Where a ray meets a plane within its passage of a cell, from t_in to t_out; infinity: not. `origin` is the ray's, seen
- * from the cell's centre. */
-LSP_FN float lsp_cell_meet(LspPlane plane, vec3 origin, vec3 direction, bool begins, float t_in, float t_out) {
+ * from the cell's centre. What lies before tmin, where the ray begins, is the surface that it left: without that test
+ * the slack draws seams along the borders of cells. */
+LSP_FN float lsp_cell_meet(LspPlane plane, vec3 origin, vec3 direction, bool begins, float tmin, float t_in,
+                           float t_out) {
   vec3 normal = lsp_vec3(plane.normal);
   precise float t = (plane.distance - lsp_dot(normal, origin)) / lsp_dot(normal, direction);
   precise float slack = LSP_CELL_SLACK * (t_out - t_in);
-  if (!(t > (begins ? t_in : t_in - slack) && t <= t_out + slack)) return LSP_INFINITY;
+  if (!(t > tmin && t > (begins ? t_in : t_in - slack) && t <= t_out + slack)) return LSP_INFINITY;
   t = t < t_in ? t_in : t;
   return t > t_out ? t_out : t;
 }
@@ -273,7 +275,7 @@ LSP_STEP void lsp_advance(LspScene scene, LspSetup s, LspQuery q) {
         uint plane = lsp_cell_plane(scene, answers, answer, look);
         if (plane != LSP_NONE) {
           precise vec3 origin = r.origin - (corner + 0.5f);
-          float hit = lsp_cell_meet(lsp_load_plane(scene, plane), origin, r.direction, begins, t, t_out);
+          float hit = lsp_cell_meet(lsp_load_plane(scene, plane), origin, r.direction, begins, s.tmin, t, t_out);
           if (hit > s.tmin && hit < s.tmax) {
             uint record = lsp_load_plane_record(scene, plane);
             over = true;
