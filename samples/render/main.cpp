@@ -224,19 +224,19 @@ int main(int argc, char** argv) {
                  "The picture: .png (tone-mapped) or .pfm (linear floats); may be given twice")
       ->required()
       ->allow_extra_args(false);
-  app.add_option("--effect", a.effect, "ao, diffuse, glossy, all or direct (default all)")
+  app.add_option("--effect", a.effect, "The light that is shown (default all)")
       ->check(CLI::IsMember({"ao", "diffuse", "glossy", "all", "direct"}));
   app.add_option("--heat", a.heat,
                  "A map in place of the picture, black to white: loss (where rays are wrong), steps (where "
                  "work goes) "
                  "or exact (where tables are not heeded); .pfm keeps the numbers")
       ->check(CLI::IsMember({"loss", "steps", "exact"}));
-  app.add_option("--mode", a.mode, "exact or approximate (default exact)")
+  app.add_option("--mode", a.mode, "How indirect rays are traced (default exact)")
       ->check(CLI::IsMember({"exact", "approximate"}));
   add_trace_arguments(app, a.trace);
   app.add_option("--camera", a.camera,
-                 "X,Y,Z:X,Y,Z:FOV: eye, target, vertical angle in degrees (default: from the scene)");
-  app.add_option("--size", a.size, "WxH in pixels (default 960x540)");
+                 "X,Y,Z:X,Y,Z:FOV, the vertical angle in degrees (default: from the scene)");
+  app.add_option("--size", a.size, "In pixels (default 960x540)");
   app.add_option("--samples", a.options.samples, "Samples a pixel (default 16)")
       ->check(CLI::Range(1u, 1u << 20));
   app.add_option("--bounces", a.options.bounces, "Bounces of indirect light (default 1)")
@@ -245,10 +245,10 @@ int main(int argc, char** argv) {
                  "Reach of --effect ao in diagonals of the scene (default 0.1)")
       ->check(CLI::Range(1e-6f, 1e6f));
   app.add_flag("--denoise", a.options.denoise, "Filter the noise of few samples out of the picture");
-  app.add_option("--sun", a.sun, "X,Y,Z: direction towards the sun");
+  app.add_option("--sun", a.sun, "Direction towards the sun");
   app.add_option("--exposure", a.exposure, "Stops to brighten a .png by (default 0)")
       ->check(CLI::Range(-20.0f, 20.0f));
-  app.add_option("--backend", a.backend, "cpu or vulkan (default cpu)")
+  app.add_option("--backend", a.backend, "Where rays are traced (default cpu)")
       ->check(CLI::IsMember({"cpu", "vulkan"}));
   app.add_option("--threads", a.options.threads, "Threads of the CPU (default: all)")
       ->check(CLI::Range(1, 1024));

@@ -171,23 +171,23 @@ void AnswerFit::add_candidates(std::span<const Plane> planes, bool near) {
     if (!(held_out_ && i % kHeldOut == kHeldOut - 1) &&
         std::find(candidates_.begin(), candidates_.end(), s.plane[i]) == candidates_.end())
       candidates_.push_back(s.plane[i]);
-  losses_.resize(candidates_.size() * stride_);
+  losses_.resize(candidates_.size() * count_);
   for (size_t i = 0; i < count_; ++i) losses_[i] = s.plane[i] != kNoPlane ? 1.0f : 0.0f;
   for (size_t c = 1; c < candidates_.size(); ++c)
     plane_losses(s, planes[candidates_[c]], near ? 0.0f : -LSP_CELL_SLACK, options_.depth_weight, 1 / size_,
-                 &losses_[c * stride_]);
+                 &losses_[c * count_]);
 }
 
 Answer AnswerFit::choose(std::span<const Plane> planes, const ShaftSamples& samples, bool near) {
   Answer answer;
   samples_ = &samples;
-  count_ = stride_ = samples.count;
+  count_ = samples.count;
   if (std::all_of(samples.plane, samples.plane + count_, [](uint32_t p) { return p == kNoPlane; }))
     return answer;
   held_out_ = count_ >= 24;
   chosen_.resize(count_);
   add_candidates(planes, near);
-  const auto losses = [&](size_t candidate) { return &losses_[candidate * stride_]; };
+  const auto losses = [&](size_t candidate) { return &losses_[candidate * count_]; };
   const size_t held = held_out_ ? count_ / kHeldOut : 0, training = count_ - held;
   size_t best = 0;
   Sums best_sums{std::numeric_limits<float>::infinity(), 0};

@@ -59,19 +59,20 @@ class AnswerFit {
   Answer choose(std::span<const Plane> planes, const ShaftSamples& samples, bool near);
 
  private:
-  // Of all samples, or of those that choose and those that only measure.
+  // Of the samples that choose, and of those that only measure.
   struct Sums {
     float training = 0, held = 0;
   };
   Sums sums(const float* losses) const;
   void add_candidates(std::span<const Plane> planes, bool near);
   float fit_split(const float* first, const float* second, Answer& answer);
+  // Into chosen_: what each sample loses by a split.
   void chosen(const std::array<int8_t, kPlaces + 1>& weights, const float* first, const float* second);
 
   FitOptions options_;
   float size_;
   const ShaftSamples* samples_ = nullptr;
-  size_t count_ = 0, stride_ = 0;
+  size_t count_ = 0;
   bool held_out_ = false;
   std::vector<uint32_t> candidates_;
   std::vector<float> losses_;  // by candidate and sample

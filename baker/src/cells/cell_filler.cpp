@@ -65,7 +65,7 @@ Polygon clip(const LspTriangle& t, const glm::vec3& lo, const glm::vec3& hi) {
 // The lines between a patch and all patches of another side. They share their places in the patches and their
 // beginnings; the first and the last thing that a line meets answer the shafts of both directions.
 struct Row {
-  size_t patches, lines;                     // at most
+  size_t lines;                              // at most
   std::vector<uint32_t> count;               // by patch: lines so far
   std::array<std::vector<float>, 4> place;   // by line
   std::array<std::vector<float>, 3> origin;  // by line
@@ -73,7 +73,7 @@ struct Row {
   std::vector<float> t_first, t_last;        // by patch and line, t_last from the other end
   std::vector<uint32_t> plane_first, plane_last;
 
-  Row(size_t patches, size_t lines) : patches(patches), lines(lines), count(patches) {
+  Row(size_t patches, size_t lines) : lines(lines), count(patches) {
     for (auto& p : place) p.resize(lines);
     for (auto& o : origin) o.resize(lines);
     for (auto* by_patch : {&way[0], &way[1], &way[2], &t_first, &t_last}) by_patch->resize(patches * lines);

@@ -90,9 +90,9 @@ bool within(const DialError& e, double wrong) {
   return e.wrong <= wrong && e.depth <= wrong && e.picture <= 3 * wrong;
 }
 
-// The cheapest dial that keeps within errors. The more of the origin
-// tables is heeded, the less of the far tables can be: a walk along the border of what is within. Tries dials
-// in the header's `balanced`.
+// The cheapest dial that keeps within errors, or the finest. The more of the origin tables is heeded, the
+// less of the far tables can be: a walk along the border of what is within. Tries dials in the header's
+// `balanced`.
 uint32_t cheapest(const lsp_scene& scene, LspHeader& header, const std::array<Rays, 2>& sets, double diagonal,
                   double wrong) {
   // What nobody knows is never heeded: rays of other places than these may come there.
