@@ -1,4 +1,6 @@
 // The CPU tracer: checks what is asked for and hands the rays to the loop for it.
+#include <cmath>
+
 #include "error.h"
 #include "lsp/lsp.h"
 #include "trace_cells.h"
@@ -28,6 +30,14 @@ extern "C" void lsp_add_counts(lsp_trace_counts* sum, const lsp_trace_counts* mo
   sum->splits += more->splits;
   sum->exact += more->exact;
   sum->exact_nodes += more->exact_nodes;
+}
+
+extern "C" float lsp_hit_offset(const lsp_scene* scene, const LspHit* hit) {
+  const LspHeader& header = *scene->header;
+  const lsp_float3 lo = header.bounds_min, hi = header.bounds_max;
+  const float diagonal = std::hypot(hi.x - lo.x, hi.y - lo.y, hi.z - lo.z);
+  if ((hit->flags & LSP_HIT_LINE_SPACE) == 0) return LSP_OFFSET_EXACT * diagonal;
+  return header.cells.size > 0 ? LSP_OFFSET_CELL * header.cells.size : LSP_OFFSET_LINE_SPACE * diagonal;
 }
 
 extern "C" lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options* options, const LspRay* rays,

@@ -64,7 +64,7 @@ HeatMap heat_map(const RenderScene& scene, const Camera& camera, const HeatOptio
       if (!std::isfinite(hit.t)) continue;
       const SurfacePoint point = scene.surface(eye, hit);
       const glm::vec3 direction = cosine_direction(point.shading_normal, random(kDirection));
-      sum += heat_of(scene, options, scene.ray_from(point, above(point, direction), kInfinity));
+      sum += heat_of(scene, options, ray_from(point, above(point, direction), kInfinity));
       ++surfaces;
     }
     seen[pixel] = surfaces > 0;

@@ -101,12 +101,11 @@ void RenderScene::find_emitters() {
   }
 }
 
-glm::vec3 RenderScene::lifted(const SurfacePoint& point) const {
-  const float offset = 3e-5f * diagonal();
-  return point.position + offset * point.geometric_normal;
+glm::vec3 lifted(const SurfacePoint& point) {
+  return point.position + point.offset * point.geometric_normal;
 }
 
-LspRay RenderScene::ray_from(const SurfacePoint& point, glm::vec3 direction, float tmax) const {
+LspRay ray_from(const SurfacePoint& point, glm::vec3 direction, float tmax) {
   return {from_glm(lifted(point)), 0.0f, from_glm(direction), tmax};
 }
 
@@ -134,6 +133,7 @@ SurfacePoint RenderScene::surface(const LspRay& ray, const LspHit& hit) const {
   const glm::vec3 direction = to_glm(ray.direction);
   SurfacePoint point{};
   point.position = to_glm(ray.origin) + hit.t * direction;
+  point.offset = lsp_hit_offset(&scene_, &hit);
   point.shading_normal = to_glm(hit.normal);
   point.geometric_normal = point.shading_normal;
   const uint32_t index =

@@ -15,6 +15,7 @@ struct SurfacePoint {
   glm::vec3 position;
   glm::vec3 geometric_normal;  // unit, on the side the ray came from
   glm::vec3 shading_normal;    // unit, on the same side
+  float offset;                // of rays that leave it, along geometric_normal (lsp_hit_offset)
   glm::vec3 base_color;
   glm::vec3 emission;
   float roughness = 1.0f;
@@ -48,10 +49,6 @@ class RenderScene {
 
   // The point that `ray` hits; `hit` must be a hit of this scene.
   SurfacePoint surface(const LspRay& ray, const LspHit& hit) const;
-
-  // A little above the surface, on the side that it was seen from, and a ray that leaves from there.
-  glm::vec3 lifted(const SurfacePoint& point) const;
-  LspRay ray_from(const SurfacePoint& point, glm::vec3 direction, float tmax) const;
 
   bool has_emitters() const { return !emitters_.empty(); }
   // `chance` picks the triangle, `point` the place on it; all in [0, 1).
@@ -96,6 +93,10 @@ glm::vec3 cosine_direction(glm::vec3 n, glm::vec2 random);
 
 // A direction that the shading normal allows but that runs into the surface is mirrored out of it.
 glm::vec3 above(const SurfacePoint& point, glm::vec3 direction);
+
+// A little above the surface, on the side that it was seen from, and a ray that leaves from there.
+glm::vec3 lifted(const SurfacePoint& point);
+LspRay ray_from(const SurfacePoint& point, glm::vec3 direction, float tmax);
 
 inline glm::vec3 to_glm(lsp_float3 v) { return {v.x, v.y, v.z}; }
 inline lsp_float3 from_glm(glm::vec3 v) { return {v.x, v.y, v.z}; }

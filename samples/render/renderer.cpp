@@ -263,7 +263,7 @@ class Renderer {
       const Surface& s = surfaces_[i];
       const glm::vec3 direction =
           cosine_direction(s.point.shading_normal, random(s.item, kOcclusionDirection));
-      rays_[i] = scene_.ray_from(s.point, above(s.point, direction), reach);
+      rays_[i] = ray_from(s.point, above(s.point, direction), reach);
       light_[i] = {s.item, kSmooth, glm::vec3(1.0f)};
     });
     trace_light(options_.indirect, true);
@@ -308,7 +308,7 @@ class Renderer {
   LspRay start_diffuse(const Surface& s, Path& path) const {
     path.throughput = s.point.base_color * (1.0f - s.point.metallic);
     const glm::vec3 direction = cosine_direction(s.point.shading_normal, random(s.item, kDiffuseDirection));
-    return scene_.ray_from(s.point, above(s.point, direction), kInfinity);
+    return ray_from(s.point, above(s.point, direction), kInfinity);
   }
 
   // One direction of the GGX lobe by visible normals (Heitz 2018); its weight is F G2 / G1.
@@ -347,7 +347,7 @@ class Renderer {
     const float shadowing = l.z > 0 ? (1.0f + lambda(v)) / (1.0f + lambda(v) + lambda(l)) : 0.0f;
     path.throughput = (f0 + (1.0f - f0) * grazing) * shadowing;
     const glm::vec3 direction = glm::normalize(l.x * t + l.y * b + l.z * n);
-    return scene_.ray_from(s.point, above(s.point, direction), kInfinity);
+    return ray_from(s.point, above(s.point, direction), kInfinity);
   }
 
   void follow_paths(int bounce) {
@@ -399,7 +399,7 @@ class Renderer {
                                  kDiffuseDirection + (paths_[i].glossy ? 0x10000u : 0u);
       const glm::vec3 direction =
           cosine_direction(points_[i].shading_normal, random(paths_[i].item, dimension));
-      path_rays_[i] = scene_.ray_from(points_[i], above(points_[i], direction), kInfinity);
+      path_rays_[i] = ray_from(points_[i], above(points_[i], direction), kInfinity);
     });
   }
 
@@ -434,7 +434,7 @@ class Renderer {
 
     const glm::vec3 toward_sky = above(p, cosine_direction(p.shading_normal, random(item, dimension)));
     slot[kSkyLight].radiance = weight * sky_.radiance(toward_sky);
-    ray[kSkyLight] = scene_.ray_from(p, toward_sky, kInfinity);
+    ray[kSkyLight] = ray_from(p, toward_sky, kInfinity);
 
     glm::vec3 t;
     glm::vec3 b;
@@ -446,7 +446,7 @@ class Renderer {
     const float sun_cosine = glm::dot(toward_sun, p.shading_normal);
     if (sun_cosine > 0 && glm::dot(toward_sun, p.geometric_normal) > 0) {
       slot[kSun].radiance = weight * sky_.sun_irradiance * (sun_cosine / kPi);
-      ray[kSun] = scene_.ray_from(p, toward_sun, kInfinity);
+      ray[kSun] = ray_from(p, toward_sun, kInfinity);
     }
 
     if (sky_.lamp_intensity != glm::vec3(0.0f))
@@ -461,7 +461,7 @@ class Renderer {
     const float z = 1.0f - 2.0f * u.x;
     const float r = std::sqrt(std::max(1.0f - z * z, 0.0f));
     const glm::vec3 on_ball(r * std::cos(2.0f * kPi * u.y), z, r * std::sin(2.0f * kPi * u.y));
-    const glm::vec3 origin = scene_.lifted(p);
+    const glm::vec3 origin = lifted(p);
     const glm::vec3 way = sky_.lamp_position + sky_.lamp_radius * on_ball - origin;
     const float distance2 = glm::dot(way, way);
     if (!(distance2 > 0)) return;
@@ -476,7 +476,7 @@ class Renderer {
   void make_emitter_ray(LightRay& slot, LspRay& ray, const SurfacePoint& p, glm::vec3 weight,
                         uint32_t dimension) const {
     constexpr uint32_t kCandidates = 8;
-    const glm::vec3 origin = scene_.lifted(p);
+    const glm::vec3 origin = lifted(p);
     float total = 0.0f;
     glm::vec3 chosen_way(0.0f);
     glm::vec3 chosen_light(0.0f);

@@ -53,5 +53,18 @@ TEST(Interface, RefusesOptionsThatItDoesNotKnow) {
   EXPECT_EQ(counts.rays, 1u);
 }
 
+TEST(Interface, OffsetIsLargerWhereATableAnswered) {
+  LspHeader header = {};
+  header.bounds_max = {3, 4, 12};
+  lsp_scene scene = {};
+  scene.header = &header;
+  LspHit hit = {};
+  EXPECT_FLOAT_EQ(lsp_hit_offset(&scene, &hit), 13 * LSP_OFFSET_EXACT);
+  hit.flags = LSP_HIT_LINE_SPACE;
+  EXPECT_FLOAT_EQ(lsp_hit_offset(&scene, &hit), 13 * LSP_OFFSET_LINE_SPACE);
+  header.cells.size = 0.5f;
+  EXPECT_FLOAT_EQ(lsp_hit_offset(&scene, &hit), 0.5f * LSP_OFFSET_CELL);
+}
+
 }  // namespace
 }  // namespace lsp::test

@@ -96,6 +96,20 @@ TEST_F(Programs, ApproximateIsCloseAndPrimaryRaysAreExact) {
   EXPECT_NEAR(all.mean_test / all.mean_reference, 1.0, 0.02);
 }
 
+// Rays that go on from a table's plane begin in front of the surface (lsp_hit_offset): from behind it they would find
+// themselves in its shadow, and the light of the next bounce was 5 % darker.
+TEST_F(Programs, BouncesFromTablesAreNoDarker) {
+  const auto mean = [](const Picture& picture) {
+    glm::dvec3 sum(0.0);
+    for (const glm::vec3& pixel : picture.pixels) sum += glm::dvec3(pixel);
+    return (sum.x + sum.y + sum.z) / static_cast<double>(3 * picture.pixels.size());
+  };
+  ASSERT_EQ(run("lsp-bake " + file("spheres.glb") + " -o " + file("fine.lsp") + " --base bvh --quiet"), 0);
+  const double exact = mean(render("fine", "exact", "--effect diffuse", 128));
+  const double approximate = mean(render("fine", "tables", "--effect diffuse --mode approximate", 128));
+  EXPECT_NEAR(approximate, exact, 0.035 * exact);
+}
+
 TEST_F(Programs, VulkanGivesTheSamePicture) {
   std::string why;
   if (!VulkanTracer::available(&why)) GTEST_SKIP() << "no Vulkan device: " << why;

@@ -30,6 +30,13 @@ LSP_END(LspHit)
  * vector of invocations a budget of iterations). */
 #define LSP_HIT_INCOMPLETE 0x80000000u
 
+/* lsp_hit_offset: how far off a hit a ray that goes on from there begins. The plane of a table passes near the surface,
+ * not in it: from behind the surface every ray would meet it, and a second bounce be too dark. Of the scene's diagonal,
+ * and of a cell's edge. */
+#define LSP_OFFSET_EXACT 3e-5f
+#define LSP_OFFSET_LINE_SPACE 1e-3f
+#define LSP_OFFSET_CELL 0.1f
+
 /* ---- what is asked of a trace -------------------------------------------------------------------------- */
 
 #define LSP_TRACE_APPROXIMATE 0x1u      /* stop at Line Spaces; without it: exact, down to triangles */

@@ -148,6 +148,11 @@ LSP_API void lsp_add_counts(lsp_trace_counts* sum, const lsp_trace_counts* more)
 LSP_API lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options* options, const LspRay* rays,
                              LspHit* hits, uint64_t count, lsp_trace_counts* counts, lsp_error* error);
 
+/* How far from a hit a ray that goes on from it should begin: along the unit geometric normal, on the side that the ray
+ * came from; in the scene's units. More for a hit that a table answered, whose plane may lie behind the surface: a ray
+ * that began there would meet the surface at once. In shaders lsp_hit_offset(scene, hit). */
+LSP_API float lsp_hit_offset(const lsp_scene* scene, const LspHit* hit);
+
 #ifdef __cplusplus
 }
 #endif

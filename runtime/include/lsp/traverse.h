@@ -693,6 +693,15 @@ LSP_FN LspHit lsp_finish(LspScene scene, LspSetup s, LspRay ray, LspBest best) {
   return hit;
 }
 
+/* As lsp_hit_offset of lsp/lsp.h. */
+LSP_FN float lsp_hit_offset(LspScene scene, LspHit hit) {
+  LspHeader header = lsp_load_header(scene);
+  vec3 extent = lsp_vec3(header.bounds_max) - lsp_vec3(header.bounds_min);
+  float diagonal = sqrt(lsp_dot(extent, extent));
+  if ((hit.flags & LSP_HIT_LINE_SPACE) == 0u) return LSP_OFFSET_EXACT * diagonal;
+  return header.cells.size > 0.0f ? LSP_OFFSET_CELL * header.cells.size : LSP_OFFSET_LINE_SPACE * diagonal;
+}
+
 struct LspTraced {
   LspHit hit;
   LspCounts counts;
