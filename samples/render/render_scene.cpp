@@ -101,9 +101,7 @@ void RenderScene::find_emitters() {
   }
 }
 
-glm::vec3 lifted(const SurfacePoint& point) {
-  return point.position + point.offset * point.geometric_normal;
-}
+glm::vec3 lifted(const SurfacePoint& point) { return point.position + point.offset * point.geometric_normal; }
 
 LspRay ray_from(const SurfacePoint& point, glm::vec3 direction, float tmax) {
   return {from_glm(lifted(point)), 0.0f, from_glm(direction), tmax};

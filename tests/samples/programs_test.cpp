@@ -96,8 +96,8 @@ TEST_F(Programs, ApproximateIsCloseAndPrimaryRaysAreExact) {
   EXPECT_NEAR(all.mean_test / all.mean_reference, 1.0, 0.02);
 }
 
-// Rays that go on from a table's plane begin in front of the surface (lsp_hit_offset): from behind it they would find
-// themselves in its shadow, and the light of the next bounce was 5 % darker.
+// Rays that go on from a table's plane begin in front of the surface (lsp_hit_offset): from behind it they
+// would find themselves in its shadow, and the light of the next bounce was 5 % darker.
 TEST_F(Programs, BouncesFromTablesAreNoDarker) {
   const auto mean = [](const Picture& picture) {
     glm::dvec3 sum(0.0);
