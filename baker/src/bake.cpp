@@ -8,12 +8,10 @@
 #include <chrono>
 #include <cmath>
 
-#include "box.h"
-#include "cells/dial.h"
+#include "base_structure.h"
 #include "lsp/program.h"
 #include "lsp/sections.h"
 #include "normals.h"
-#include "sites.h"
 #include "vectors.h"
 
 namespace lsp {
@@ -62,8 +60,8 @@ void fill_triangles(const Mesh& mesh, const Bvh& bvh, bool normals, bool materia
   }
 }
 
-void set_base(const Bvh& bvh, LspHeader& h) {
-  h.base_structure = LSP_BASE_BVH;
+// What the header states of the BVH, which is there whatever the base structure is.
+void set_bvh(const Bvh& bvh, LspHeader& h) {
   h.root = bvh.root;
   h.max_depth = bvh.max_depth;
   h.max_stack = std::max(1u, bvh.max_depth);
@@ -71,15 +69,27 @@ void set_base(const Bvh& bvh, LspHeader& h) {
   h.max_leaf_triangles = bvh.max_leaf_triangles;
 }
 
-void set_base(const NTree& ntree, LspHeader& h) {
-  h.base_structure = LSP_BASE_NTREE;
-  h.root = ntree.node_count ? 0 : LSP_NONE;
-  h.max_depth = h.max_stack = h.ntree_depth = std::max(1u, ntree.levels);
-  h.max_leaf_triangles = ntree.max_leaf_triangles;
-  h.ntree_branching = ntree.branching;
-  h.ntree_lo = ntree.lo;
-  h.ntree_size = ntree.size;
-  h.ntree_margin = ntree.margin;
+// What the header states of the scene and of how it is to be traced.
+void set_scene(const Mesh& mesh, const BakeOptions& options, const Box& bounds, LspHeader& h) {
+  h.bounds_min = f3(bounds.lo);
+  h.bounds_max = f3(bounds.hi);
+  h.primitive_count = mesh.primitive_count;
+  h.origin_x = std::bit_cast<uint64_t>(mesh.origin.x);
+  h.origin_y = std::bit_cast<uint64_t>(mesh.origin.y);
+  h.origin_z = std::bit_cast<uint64_t>(mesh.origin.z);
+  h.plane_tolerance = options.plane_tolerance;
+  h.normal_angle_cos =
+      options.normal_angle_degrees >= 180 ? -1.0f : std::cos(options.normal_angle_degrees * 0.017453293f);
+  h.root_line_space = LSP_NONE;
+}
+
+uint32_t features_of(const Baked& baked) {
+  const std::vector<LspLineSpace>& spaces = baked.line_spaces.records;
+  const bool binary =
+      std::any_of(spaces.begin(), spaces.end(), [](const LspLineSpace& r) { return entry_bytes(r) == 0; });
+  return LSP_FEATURE_EXACT | (spaces.empty() ? 0 : LSP_FEATURE_LINE_SPACES) |
+         (baked.normals.empty() ? 0 : LSP_FEATURE_NORMALS) |
+         (baked.materials.empty() ? 0 : LSP_FEATURE_MATERIALS) | (binary ? LSP_FEATURE_BINARY : 0);
 }
 
 // The bake's largest arrays at their largest.
@@ -96,12 +106,8 @@ Estimate estimate_bytes(const Mesh& mesh, const BakeOptions& options, uint64_t b
   const uint64_t tree = triangles * (32 * 3 + 120) + triangles * (64 + 48 * 2 + 12);
   if (!options.line_spaces) return {kProgram + input + tree, 0, 0};
   uint64_t sites = 0;
-  const uint64_t b = options.ntree.branching;
-  for (uint32_t d : options.line_space.depths) {
-    const uint64_t nodes =
-        options.base == Base::kNTree ? (d < 2 ? (d ? b * b * b : 1) : 1ull << 40) : 1ull << std::min(d, 40u);
-    sites += std::min<uint64_t>(nodes, triangles / 4 + 1);
-  }
+  for (const uint32_t depth : options.line_space.depths)
+    sites += std::min<uint64_t>(base_structure(options.base).nodes_at(options, depth), triangles / 4 + 1);
   const uint64_t n = options.line_space.resolution, shafts = 30 * n * n * n * n;
   const uint64_t threads =
       std::min(uint64_t(tbb::this_task_arena::max_concurrency()),
@@ -124,20 +130,6 @@ void plan_memory(const Mesh& mesh, BakeOptions& options) {
                   "the bake needs about " + with_commas(needed >> 20) + " MiB, over the limit of " +
                       with_commas(limit >> 20) +
                       " MiB: raise --memory-limit, or lower --depth or --resolution");
-}
-
-void fill_cells(Baked& baked, const Bvh& bvh, const Box& bounds, const BakeOptions& options,
-                const std::function<void(double)>& progress) {
-  LspHeader& h = baked.header;
-  h.base_structure = LSP_BASE_CELLS;
-  baked.cell_grid = options.cells ? build_cell_grid(baked.triangles, bounds, options.cells)
-                                  : choose_cell_grid(baked.triangles, bounds);
-  baked.cell_tables =
-      fill_cell_tables(baked.cell_grid, bvh, h, baked.triangles, options.cell_tables, progress);
-  set_cells(baked.cell_grid, baked.cell_tables, options.cell_tables, h);
-  const size_t cells = baked.cell_grid.words.size();
-  baked.skipped.push_back("empty cells: " + with_commas(cells - baked.cell_tables.cells.size()) + " of " +
-                          with_commas(cells));
 }
 
 }  // namespace
@@ -179,22 +171,16 @@ void set_counts(Baked& baked) {
 Baked bake(const Mesh& mesh, const BakeOptions& asked, const Progress& progress) {
   BakeOptions options = asked;
   plan_memory(mesh, options);
-  const auto stage = [&](const char* name) {
-    return [&progress, name](double done) {
-      if (progress) progress(name, done);
-    };
-  };
+  const BaseStructure& base = base_structure(options.base);
   Baked baked;
-  LspHeader& h = baked.header;
-
-  // An NTree refers to triangles, so that none is repeated; the BVH then orders them and fills the Line
-  // Spaces.
-  const bool ntree = options.base == Base::kNTree;
-  BvhOptions bvh_options = options.bvh;
-  if (ntree) bvh_options.spatial_splits = false;
+  BakeJob job{options, progress, {}, {}, baked};
   auto start = std::chrono::steady_clock::now();
-  Bvh bvh = build_bvh(mesh, bvh_options, stage("base structure"));
-  baked.tree_seconds = seconds_since(start);
+  const auto lap = [&start] { return seconds_since(std::exchange(start, std::chrono::steady_clock::now())); };
+
+  BvhOptions bvh_options = options.bvh;
+  bvh_options.spatial_splits = bvh_options.spatial_splits && base.repeats_triangles;
+  job.bvh = build_bvh(mesh, bvh_options, job.stage("base structure"));
+  baked.tree_seconds = lap();
 
   const bool shading = options.purpose == Purpose::kDiffuse || options.purpose == Purpose::kGlossy ||
                        options.purpose == Purpose::kAll;
@@ -206,70 +192,24 @@ Baked bake(const Mesh& mesh, const BakeOptions& asked, const Progress& progress)
     normals = false;
     baked.skipped.push_back("normals: all are their triangle's own");
   }
-  fill_triangles(mesh, bvh, normals, shading, baked);
+  fill_triangles(mesh, job.bvh, normals, shading, baked);
   if (shading)
     for (const Material& m : mesh.materials)
       baked.materials.push_back({f3(m.base_color), m.opacity, f3(m.emission), m.roughness, m.metallic, {}});
-
-  Box bounds;
   for (const LspTriangle& t : baked.triangles)
-    for (const lsp_float3& v : {t.v0, t.v1, t.v2}) bounds.grow({v.x, v.y, v.z});
-  h.bounds_min = f3(bounds.lo);
-  h.bounds_max = f3(bounds.hi);
-  h.primitive_count = mesh.primitive_count;
-  h.origin_x = std::bit_cast<uint64_t>(mesh.origin.x);
-  h.origin_y = std::bit_cast<uint64_t>(mesh.origin.y);
-  h.origin_z = std::bit_cast<uint64_t>(mesh.origin.z);
-  h.plane_tolerance = options.plane_tolerance;
-  h.normal_angle_cos =
-      options.normal_angle_degrees >= 180 ? -1.0f : std::cos(options.normal_angle_degrees * 0.017453293f);
-  h.root_line_space = LSP_NONE;
-  set_base(bvh, h);
-  if (ntree) {
-    start = std::chrono::steady_clock::now();
-    NTreeOptions ntree_options = options.ntree;
-    if (options.memory_limit) ntree_options.max_bytes = options.memory_limit / 4;
-    baked.ntree = build_ntree(baked.triangles, ntree_options, stage("NTree"));
-    set_base(baked.ntree, h);
-    baked.tree_seconds += seconds_since(start);
-  }
+    for (const lsp_float3& v : {t.v0, t.v1, t.v2}) job.bounds.grow({v.x, v.y, v.z});
+  set_scene(mesh, options, job.bounds, baked.header);
+  set_bvh(job.bvh, baked.header);
 
-  const bool cells = options.base == Base::kCells;
-  if (cells) {
-    start = std::chrono::steady_clock::now();
-    fill_cells(baked, bvh, bounds, options, stage("cells"));
-    baked.line_space_seconds = seconds_since(start);
-  } else if (options.line_spaces) {
-    start = std::chrono::steady_clock::now();
-    const std::vector<LineSpaceSite> sites = ntree ? choose_sites(baked.ntree, bvh, h, options.line_space)
-                                                   : choose_sites(bvh, h, options.line_space);
-    std::vector<uint32_t> references;
-    baked.line_spaces = fill_line_spaces(bvh, h, baked.triangles, sites, options.line_space, references,
-                                         stage("Line Spaces"));
-    h.root_line_space = ntree ? attach(baked.ntree, sites, references) : attach(bvh, sites, references);
-    baked.line_space_seconds = seconds_since(start);
-    h.resolution = options.line_space.resolution;
-    h.line_space_depth = options.line_space.depths.back();
-    h.line_space_triangles = options.line_space.triangles;
-    const LineSpaces& ls = baked.line_spaces;
-    baked.skipped.push_back("empty shafts: " + with_commas(ls.shafts - ls.filled) + " of " +
-                            with_commas(ls.shafts));
-    if (ls.dropped) baked.skipped.push_back("Line Spaces without a filled shaft: " + with_commas(ls.dropped));
-  } else {
-    baked.skipped.push_back("Line Spaces: not asked for");
-  }
-  if (!ntree) baked.nodes = std::move(bvh.nodes);
+  lap();
+  base.build(job);
+  baked.tree_seconds += lap();
+  base.fill(job);
+  baked.line_space_seconds = lap();
 
-  h.required_features = LSP_FEATURE_EXACT | (ntree ? LSP_FEATURE_NTREE : 0) |
-                        (cells ? LSP_FEATURE_CELLS : 0) |
-                        (baked.line_spaces.records.empty() ? 0 : LSP_FEATURE_LINE_SPACES) |
-                        (normals ? LSP_FEATURE_NORMALS : 0) | (shading ? LSP_FEATURE_MATERIALS : 0) |
-                        (std::any_of(baked.line_spaces.records.begin(), baked.line_spaces.records.end(),
-                                     [](const LspLineSpace& r) { return entry_bytes(r) == 0; })
-                             ? LSP_FEATURE_BINARY
-                             : 0);
+  baked.header.required_features = features_of(baked) | base.feature;
   set_counts(baked);
-  if (cells) choose_dial(baked, options.cells_wrong);
+  if (base.finish) base.finish(job);
   return baked;
 }
 

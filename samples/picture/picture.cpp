@@ -29,6 +29,15 @@ uint8_t to_srgb(float linear) {
   return static_cast<uint8_t>(encoded * 255.0f + 0.5f);
 }
 
+std::string png(int width, int height, int channels, const std::vector<uint8_t>& bytes) {
+  std::string out;
+  const auto append = [](void* context, void* data, int size) {
+    static_cast<std::string*>(context)->append(static_cast<const char*>(data), static_cast<size_t>(size));
+  };
+  stbi_write_png_to_func(append, &out, width, height, channels, bytes.data(), channels * width);
+  return out;
+}
+
 std::string to_png(const Picture& picture, Transfer transfer) {
   std::vector<uint8_t> bytes;
   bytes.reserve(picture.pixels.size() * 3);
@@ -36,12 +45,7 @@ std::string to_png(const Picture& picture, Transfer transfer) {
     const glm::vec3 shown = transfer == Transfer::kToneMapped ? tone_map(pixel) : pixel;
     for (int i = 0; i < 3; ++i) bytes.push_back(to_srgb(shown[i]));
   }
-  std::string out;
-  const auto append = [](void* context, void* data, int size) {
-    static_cast<std::string*>(context)->append(static_cast<const char*>(data), static_cast<size_t>(size));
-  };
-  stbi_write_png_to_func(append, &out, picture.width, picture.height, 3, bytes.data(), 3 * picture.width);
-  return out;
+  return png(picture.width, picture.height, 3, bytes);
 }
 
 std::string to_pfm(const Picture& picture) {
@@ -71,6 +75,10 @@ void write_picture(const std::filesystem::path& path, const Picture& picture, Tr
   } else {
     throw Failure(Exit::kUsage, path.string(), "pictures are written as .png or .pfm; choose one of the two");
   }
+}
+
+std::string rgba_png(int width, int height, const std::vector<uint8_t>& rgba) {
+  return png(width, height, 4, rgba);
 }
 
 Picture read_pfm(const std::filesystem::path& path) {

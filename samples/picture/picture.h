@@ -32,6 +32,9 @@ enum class Transfer {
 // `transfer` and keeps the floats.
 void write_picture(const std::filesystem::path& path, const Picture& picture, Transfer transfer);
 
+// The bytes of a .png file of eight bits a channel: red, green, blue and alpha, rows from the top.
+std::string rgba_png(int width, int height, const std::vector<uint8_t>& rgba);
+
 // Reads a colour .pfm file, of either byte order. Hostile bytes are fine. Throws lsp::Failure: kFile where it
 // cannot be read, kInvalid where it is not such a file.
 Picture read_pfm(const std::filesystem::path& path);

@@ -14,6 +14,11 @@ namespace {
 
 float luminance(glm::vec3 color) { return glm::dot(color, glm::vec3(0.2126f, 0.7152f, 0.0722f)); }
 
+// The share of a triangle that is there: it shines as a whole one of that much of its radiance.
+float share_there(const LspTriangle& triangle) {
+  return 1.0f - static_cast<float>(triangle.flags >> LSP_TRIANGLE_GAPS_SHIFT) / 65536.0f;
+}
+
 }  // namespace
 
 RenderScene::RenderScene(const std::filesystem::path& path) {
@@ -86,7 +91,8 @@ void RenderScene::find_emitters() {
   for (uint32_t i = 0; i < scene_.header->triangle_count; ++i) {
     const LspTriangle& triangle = scene_.triangles[i];
     if (triangle_of_primitive_[triangle.primitive] != i || triangle.material >= materials_.size()) continue;
-    const float brightness = luminance(to_glm(materials_[triangle.material].emission));
+    const float brightness =
+        share_there(triangle) * luminance(to_glm(materials_[triangle.material].emission));
     if (!(brightness > 0) || !std::isfinite(brightness)) continue;
     const glm::vec3 v0 = to_glm(triangle.v0);
     const float area = 0.5f * glm::length(glm::cross(to_glm(triangle.v1) - v0, to_glm(triangle.v2) - v0));
@@ -124,7 +130,7 @@ EmitterPoint RenderScene::sample_emitter(float chance, glm::vec2 point) const {
   const glm::vec3 e1 = to_glm(triangle.v1) - v0;
   const glm::vec3 e2 = to_glm(triangle.v2) - v0;
   return {v0 + u * e1 + v * e2, glm::normalize(glm::cross(e1, e2)),
-          to_glm(materials_[triangle.material].emission), found->pdf};
+          share_there(triangle) * to_glm(materials_[triangle.material].emission), found->pdf};
 }
 
 SurfacePoint RenderScene::surface(const LspRay& ray, const LspHit& hit) const {

@@ -2,6 +2,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "picture.h"
 #include "scene.h"
 
 namespace lsp::sample {
@@ -56,8 +57,9 @@ class Writer {
       Json primitives = Json::array();
       for (const Part& part : mesh.parts) {
         Json primitive;
-        primitive["attributes"]["POSITION"] = vectors(part.surface.positions, true);
-        primitive["attributes"]["NORMAL"] = vectors(part.surface.normals, false);
+        primitive["attributes"]["POSITION"] = positions(part.surface.positions);
+        primitive["attributes"]["NORMAL"] = vectors(part.surface.normals);
+        if (!part.surface.uvs.empty()) primitive["attributes"]["TEXCOORD_0"] = vectors(part.surface.uvs);
         primitive["indices"] = indices(part.surface);
         primitive["material"] = part.material;
         primitives.push_back(std::move(primitive));
@@ -85,6 +87,9 @@ class Writer {
           strong = true;
         }
       }
+      if (!material.texture.rgba.empty())
+        out["pbrMetallicRoughness"]["baseColorTexture"] = {{"index", texture(material.texture)}};
+      if (material.masked) out["alphaMode"] = "MASK";
       out["doubleSided"] = true;
       materials.push_back(std::move(out));
     }
@@ -92,32 +97,47 @@ class Writer {
     if (strong) root_["extensionsUsed"] = Json::array({"KHR_materials_emissive_strength"});
   }
 
-  // Appends `size` bytes as a buffer view and returns its number.
-  int view(const void* data, size_t size, int target) {
+  // Appends a texture, its picture among the file's bytes, and returns its number.
+  int texture(const Texture& texture) {
+    constexpr int kClampToEdge = 33071;
+    const std::string png = rgba_png(texture.width, texture.height, texture.rgba);
+    Json& images = root_["images"];
+    images.push_back({{"bufferView", view(png.data(), png.size())}, {"mimeType", "image/png"}});
+    root_["samplers"] = Json::array({{{"wrapS", kClampToEdge}, {"wrapT", kClampToEdge}}});
+    root_["textures"].push_back({{"source", images.size() - 1}, {"sampler", 0}});
+    return static_cast<int>(images.size()) - 1;
+  }
+
+  // Appends `size` bytes as a buffer view and returns its number. `target`: 0 where none is to be named.
+  int view(const void* data, size_t size, int target = 0) {
     while (bytes_.size() % 4 != 0) bytes_.push_back('\0');
-    views_.push_back(
-        {{"buffer", 0}, {"byteOffset", bytes_.size()}, {"byteLength", size}, {"target", target}});
+    views_.push_back({{"buffer", 0}, {"byteOffset", bytes_.size()}, {"byteLength", size}});
+    if (target != 0) views_.back()["target"] = target;
     bytes_.append(static_cast<const char*>(data), size);
     return static_cast<int>(views_.size()) - 1;
   }
 
-  int vectors(const std::vector<glm::vec3>& values, bool with_bounds) {
-    Json accessor = {{"bufferView", view(values.data(), values.size() * sizeof(glm::vec3), kArrayBuffer)},
-                     {"componentType", kFloat},
-                     {"count", values.size()},
-                     {"type", "VEC3"}};
-    if (with_bounds) {
-      glm::vec3 lo(std::numeric_limits<float>::max());
-      glm::vec3 hi(-std::numeric_limits<float>::max());
-      for (const glm::vec3& v : values) {
-        lo = glm::min(lo, v);
-        hi = glm::max(hi, v);
-      }
-      accessor["min"] = array3(lo);
-      accessor["max"] = array3(hi);
-    }
-    accessors_.push_back(std::move(accessor));
+  template <class Vector>
+  int vectors(const std::vector<Vector>& values) {
+    accessors_.push_back({{"bufferView", view(values.data(), values.size() * sizeof(Vector), kArrayBuffer)},
+                          {"componentType", kFloat},
+                          {"count", values.size()},
+                          {"type", Vector::length() == 2 ? "VEC2" : "VEC3"}});
     return static_cast<int>(accessors_.size()) - 1;
+  }
+
+  // Vectors with their bounds, which glTF wants of positions.
+  int positions(const std::vector<glm::vec3>& values) {
+    const int accessor = vectors(values);
+    glm::vec3 lo(std::numeric_limits<float>::max());
+    glm::vec3 hi(-std::numeric_limits<float>::max());
+    for (const glm::vec3& v : values) {
+      lo = glm::min(lo, v);
+      hi = glm::max(hi, v);
+    }
+    accessors_.back()["min"] = array3(lo);
+    accessors_.back()["max"] = array3(hi);
+    return accessor;
   }
 
   int indices(const Surface& surface) {

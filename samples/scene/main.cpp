@@ -15,15 +15,18 @@ int main(int argc, char** argv) {
   std::string output;
   std::string name = "atrium";
   uint64_t triangles = 0;
+  bool no_masks = false;
   add_common_options(app, kProgram, common);
   app.add_option("OUT.glb", output, "The file to write")->required();
-  app.add_option("--scene", name, "atrium, spheres or plane")
-      ->check(CLI::IsMember({"atrium", "spheres", "plane"}));
+  app.add_option("--scene", name, "atrium, grove, spheres or plane")
+      ->check(CLI::IsMember({"atrium", "grove", "spheres", "plane"}));
   app.add_option("--triangles", triangles, "About how many triangles (default: as fine as looks good)")
       ->check(CLI::Range(uint64_t{1000}, uint64_t{20'000'000}));
+  app.add_flag("--no-masks", no_masks, "Leave out the masks of leaves: cards are then solid");
   return run_program(kProgram, app, argc, argv, [&] {
     const auto start = std::chrono::steady_clock::now();
-    const Scene scene = make_scene(name, triangles == 0 ? Detail{} : detail_for(name, triangles));
+    Scene scene = make_scene(name, triangles == 0 ? Detail{} : detail_for(name, triangles));
+    if (no_masks) take_masks_off(scene);
     const std::string bytes = to_glb(scene);
     write_file(output, bytes);
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;

@@ -9,17 +9,6 @@ namespace {
 constexpr float kPi = 3.14159265358979324f;
 constexpr float kTau = 2.0f * kPi;
 
-// A number in [0, 1) that depends on `seed` and `index` alone.
-float random01(int seed, int index) {
-  uint32_t x = static_cast<uint32_t>(seed) * 0x9E3779B9u + static_cast<uint32_t>(index) * 0x85EBCA6Bu + 1u;
-  x ^= x >> 16;
-  x *= 0x7FEB352Du;
-  x ^= x >> 15;
-  x *= 0x846CA68Bu;
-  x ^= x >> 16;
-  return static_cast<float>(x >> 8) * (1.0f / 16777216.0f);
-}
-
 float smooth(float from, float to, float x) {
   const float t = glm::clamp((x - from) / (to - from), 0.0f, 1.0f);
   return t * t * (3.0f - 2.0f * t);
@@ -40,6 +29,16 @@ float superformula(float angle, float m, float n1, float n2, float n3) {
 glm::mat4 move(glm::vec3 by) { return glm::translate(glm::mat4(1.0f), by); }
 
 }  // namespace
+
+float random01(int seed, int index) {
+  uint32_t x = static_cast<uint32_t>(seed) * 0x9E3779B9u + static_cast<uint32_t>(index) * 0x85EBCA6Bu + 1u;
+  x ^= x >> 16;
+  x *= 0x7FEB352Du;
+  x ^= x >> 15;
+  x *= 0x846CA68Bu;
+  x ^= x >> 16;
+  return static_cast<float>(x >> 8) * (1.0f / 16777216.0f);
+}
 
 Surface banner(const Detail& detail, float width, float length, int seed) {
   const float phase = kTau * random01(seed, 0);

@@ -5,6 +5,9 @@
 
 namespace lsp::sample {
 
+// A number in [0, 1) that depends on `seed` and `index` alone.
+float random01(int seed, int index);
+
 // A banner that hangs from y = 0 down to -length, `width` wide along x, billowing along z. `seed` varies it.
 Surface banner(const Detail& detail, float width, float length, int seed);
 // One half of a pair of curtains for an opening from x = 0 to `width`, hung at y = 0, gathered and tied back

@@ -69,9 +69,14 @@ Scene make_plane(const Detail& detail) {
 
 Scene make_scene(const std::string& name, const Detail& detail) {
   if (name == "atrium") return make_atrium(detail);
+  if (name == "grove") return make_grove(detail);
   if (name == "spheres") return make_spheres(detail);
   if (name == "plane") return make_plane(detail);
-  throw Failure(Exit::kUsage, "", "there is no scene '" + name + "'; choose atrium, spheres or plane");
+  throw Failure(Exit::kUsage, "", "there is no scene '" + name + "'; choose atrium, grove, spheres or plane");
+}
+
+void take_masks_off(Scene& scene) {
+  for (Material& material : scene.materials) material.masked = false;
 }
 
 Detail detail_for(const std::string& name, uint64_t triangles) {

@@ -13,12 +13,21 @@
 
 namespace lsp::sample {
 
+// Colours as textures have them: rows from the top, sRGB and alpha.
+struct Texture {
+  int width = 0;
+  int height = 0;
+  std::vector<uint8_t> rgba;
+};
+
 struct Material {
   std::string name;
   glm::vec3 base_color{0.8f};  // linear
   float roughness = 0.9f;
   float metallic = 0.0f;
   glm::vec3 emission{0.0f};  // linear radiance
+  Texture texture{};         // multiplies base_color; none where it is empty
+  bool masked = false;       // what has an alpha below a half is not there
 };
 
 struct Part {
@@ -63,11 +72,15 @@ struct Detail {
   bool shows(float from) const { return scale >= from; }
 };
 
-// The scenes, by name: "atrium", "spheres", "plane". An unknown name throws lsp::Failure.
+// The scenes, by name: "atrium", "grove", "spheres", "plane". An unknown name throws lsp::Failure.
 Scene make_scene(const std::string& name, const Detail& detail);
 Scene make_atrium(const Detail& detail);
+Scene make_grove(const Detail& detail);
 Scene make_spheres(const Detail& detail);
 Scene make_plane(const Detail& detail);
+
+// Leaves and whatever else has a mask become solid.
+void take_masks_off(Scene& scene);
 
 // The detail at which the scene has about `triangles` triangles (as near as whole steps allow). Throws
 // lsp::Failure (Exit::kUsage) where that misses the wish by more than a quarter.

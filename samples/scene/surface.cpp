@@ -63,6 +63,7 @@ void append(Surface& surface, const Surface& other, const glm::mat4& transform) 
     surface.positions.push_back(glm::vec3(transform * glm::vec4(p, 1.0f)));
   }
   for (const glm::vec3& n : other.normals) surface.normals.push_back(glm::normalize(normal_transform * n));
+  surface.uvs.insert(surface.uvs.end(), other.uvs.begin(), other.uvs.end());
   for (const uint32_t i : other.indices) surface.indices.push_back(first + i);
 }
 

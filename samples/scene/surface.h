@@ -14,11 +14,13 @@ namespace lsp::sample {
 struct Surface {
   std::vector<glm::vec3> positions;
   std::vector<glm::vec3> normals;  // one per position
+  std::vector<glm::vec2> uvs;      // none, or one per position: into the material's texture
   std::vector<uint32_t> indices;   // three per triangle
   uint64_t triangle_count() const { return indices.size() / 3; }
 };
 
-// Adds `other`, moved by `transform` (any affine map but a mirroring one), to `surface`.
+// Adds `other`, moved by `transform` (any affine map but a mirroring one), to `surface`. Both have texture
+// coordinates, or neither.
 void append(Surface& surface, const Surface& other, const glm::mat4& transform = glm::mat4(1.0f));
 
 // A point of a surface over u, v in [0, 1].

@@ -18,14 +18,14 @@ TEST(SampleScene, AtriumStaysInItsBudget) {
 }
 
 TEST(SampleScene, SameBytesTwice) {
-  for (const char* name : {"atrium", "spheres", "plane"}) {
+  for (const char* name : {"atrium", "grove", "spheres", "plane"}) {
     EXPECT_EQ(to_glb(make_scene(name, {0.4f})), to_glb(make_scene(name, {0.4f}))) << name;
   }
 }
 
 TEST(SampleScene, TessellationMeetsTheWish) {
   for (const uint64_t wish : {3'000u, 30'000u, 200'000u}) {
-    for (const char* name : {"spheres", "plane"}) {
+    for (const char* name : {"grove", "spheres", "plane"}) {
       const double have = static_cast<double>(triangle_count(make_scene(name, detail_for(name, wish))));
       EXPECT_NEAR(have / static_cast<double>(wish), 1.0, 0.25) << name << " of " << wish;
     }

@@ -1,0 +1,49 @@
+// What lsp-bake is asked for, as its command line says it.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "bake.h"
+#include "lsp/command_line.h"
+
+namespace lsp {
+
+constexpr uint32_t kNTreeLevels = 3;
+
+struct Arguments {
+  std::vector<std::filesystem::path> inputs;
+  std::filesystem::path output;
+  std::string base = "bvh";
+  uint32_t cells = 0;
+  uint32_t branching = 0;  // 0: the resolution
+  uint32_t levels = kNTreeLevels;
+  uint32_t resolution = 6;
+  std::vector<uint32_t> depths = {9};
+  uint32_t triangles = 0;
+  Purpose purpose = Purpose::kAll;
+  bool no_exact = false;
+  bool exact = false;
+  bool no_line_spaces = false;
+  bool conservative = false;
+  bool directed = false;
+  std::string compress = "none";
+  uint32_t align = 4096;
+  uint32_t threads = 0;
+  uint64_t memory_limit = 0;
+  float normal_angle = 180;
+  float plane_tolerance = 0.0f;
+  uint32_t samples = 5;
+  float crease_angle = 40;
+  bool no_splits = false;
+  std::string preset = "balanced";
+  double max_error = 0;  // per cent of rays, 0: not asked for
+  bool strict = false;
+  std::filesystem::path depfile;
+  bool resolution_given = false, depth_given = false, samples_given = false;
+  CommonOptions common;
+};
+
+}  // namespace lsp

@@ -1,0 +1,114 @@
+#include "base_structure.h"
+
+#include <algorithm>
+
+#include "cells/dial.h"
+#include "sites.h"
+
+namespace lsp {
+namespace {
+
+uint64_t bvh_nodes_at(const BakeOptions&, uint32_t depth) { return 1ull << std::min(depth, 40u); }
+
+uint64_t ntree_nodes_at(const BakeOptions& options, uint32_t depth) {
+  const uint64_t b = options.ntree.branching;
+  return depth == 0 ? 1 : depth == 1 ? b * b * b : 1ull << 40;
+}
+
+// Line Spaces on `sites`, which are nodes of `tree`.
+template <class Tree>
+void fill_sites(BakeJob& job, Tree& tree, const std::vector<LineSpaceSite>& sites) {
+  const LineSpaceOptions& options = job.options.line_space;
+  Baked& baked = job.baked;
+  LspHeader& h = baked.header;
+  std::vector<uint32_t> references;
+  baked.line_spaces =
+      fill_line_spaces(job.bvh, h, baked.triangles, sites, options, references, job.stage("Line Spaces"));
+  h.root_line_space = attach(tree, sites, references);
+  h.resolution = options.resolution;
+  h.line_space_depth = options.depths.back();
+  h.line_space_triangles = options.triangles;
+  const LineSpaces& ls = baked.line_spaces;
+  baked.skipped.push_back("empty shafts: " + with_commas(ls.shafts - ls.filled) + " of " +
+                          with_commas(ls.shafts));
+  if (ls.dropped) baked.skipped.push_back("Line Spaces without a filled shaft: " + with_commas(ls.dropped));
+}
+
+void note_no_line_spaces(Baked& baked) { baked.skipped.push_back("Line Spaces: not asked for"); }
+
+void build_bvh_base(BakeJob& job) { job.baked.header.base_structure = LSP_BASE_BVH; }
+
+void fill_bvh(BakeJob& job) {
+  if (job.options.line_spaces)
+    fill_sites(job, job.bvh, choose_sites(job.bvh, job.baked.header, job.options.line_space));
+  else
+    note_no_line_spaces(job.baked);
+  job.baked.nodes = std::move(job.bvh.nodes);
+}
+
+void build_ntree_base(BakeJob& job) {
+  NTreeOptions options = job.options.ntree;
+  if (job.options.memory_limit) options.max_bytes = job.options.memory_limit / 4;
+  const NTree& ntree = job.baked.ntree = build_ntree(job.baked.triangles, options, job.stage("NTree"));
+  LspHeader& h = job.baked.header;
+  h.base_structure = LSP_BASE_NTREE;
+  h.root = ntree.node_count ? 0 : LSP_NONE;
+  h.max_depth = h.max_stack = h.ntree_depth = std::max(1u, ntree.levels);
+  h.max_leaf_triangles = ntree.max_leaf_triangles;
+  h.ntree_branching = ntree.branching;
+  h.ntree_lo = ntree.lo;
+  h.ntree_size = ntree.size;
+  h.ntree_margin = ntree.margin;
+}
+
+void fill_ntree(BakeJob& job) {
+  NTree& ntree = job.baked.ntree;
+  if (job.options.line_spaces)
+    fill_sites(job, ntree, choose_sites(ntree, job.bvh, job.baked.header, job.options.line_space));
+  else
+    note_no_line_spaces(job.baked);
+}
+
+void build_cells_base(BakeJob& job) {
+  Baked& baked = job.baked;
+  baked.header.base_structure = LSP_BASE_CELLS;
+  baked.cell_grid = job.options.cells ? build_cell_grid(baked.triangles, job.bounds, job.options.cells)
+                                      : choose_cell_grid(baked.triangles, job.bounds);
+}
+
+void fill_cells(BakeJob& job) {
+  const CellTableOptions& options = job.options.cell_tables;
+  Baked& baked = job.baked;
+  baked.cell_tables =
+      fill_cell_tables(baked.cell_grid, job.bvh, baked.header, baked.triangles, options, job.stage("cells"));
+  set_cells(baked.cell_grid, baked.cell_tables, options, baked.header);
+  const size_t cells = baked.cell_grid.words.size();
+  baked.skipped.push_back("empty cells: " + with_commas(cells - baked.cell_tables.cells.size()) + " of " +
+                          with_commas(cells));
+  baked.nodes = std::move(job.bvh.nodes);
+}
+
+void finish_cells(BakeJob& job) { choose_dial(job.baked, job.options.cells_wrong); }
+
+constexpr BaseStructure kBvh = {0, true, bvh_nodes_at, build_bvh_base, fill_bvh, nullptr};
+// It refers to triangles, so that none is repeated; the BVH orders them and fills the Line Spaces.
+constexpr BaseStructure kNTree = {LSP_FEATURE_NTREE, false,      ntree_nodes_at,
+                                  build_ntree_base,  fill_ntree, nullptr};
+constexpr BaseStructure kCells = {LSP_FEATURE_CELLS, true,       bvh_nodes_at,
+                                  build_cells_base,  fill_cells, finish_cells};
+
+}  // namespace
+
+const BaseStructure& base_structure(Base base) {
+  switch (base) {
+    case Base::kNTree:
+      return kNTree;
+    case Base::kCells:
+      return kCells;
+    case Base::kBvh:
+      break;
+  }
+  return kBvh;
+}
+
+}  // namespace lsp

@@ -1,0 +1,113 @@
+#include "provenance.h"
+
+#include <algorithm>
+#include <cinttypes>
+#include <cstdio>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "import/source_file.h"
+#include "lsp/program.h"
+#include "writer.h"
+
+namespace lsp {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// Null where nothing could be measured.
+Json to_json(const MeasuredError& e) {
+  if (e.rays == 0) return nullptr;
+  return {{"rays", e.rays},
+          {"wrong_hits", e.wrong_hits},
+          {"wrong_misses", e.wrong_misses},
+          {"wrong_percent", 100 * e.wrong_share()},
+          {"depth_error_percent_of_diagonal", 100 * e.depth_error}};
+}
+
+// The path of a source relative to the folder of the input that led to it.
+std::string name_beside(const std::filesystem::path& file, const std::filesystem::path& input) {
+  const std::filesystem::path folder = input.parent_path();
+  const std::filesystem::path relative = folder.empty() ? file : file.lexically_relative(folder);
+  return printable((relative.empty() ? file : relative).generic_string());
+}
+
+}  // namespace
+
+std::string hex128(uint64_t lo, uint64_t hi) {
+  char text[33];
+  std::snprintf(text, sizeof text, "%016" PRIx64 "%016" PRIx64, hi, lo);
+  return text;
+}
+
+void write_depfile(const Arguments& a, const Mesh& mesh) {
+  const auto escaped = [](const std::filesystem::path& path) {
+    std::string text;
+    for (const char c : path.string()) {
+      if (c == ' ' || c == '#') text += '\\';
+      if (c == '$') text += '$';
+      text += c;
+    }
+    return text;
+  };
+  std::string rule = escaped(a.output) + ":";
+  for (const auto& files : mesh.sources) {
+    for (const auto& file : files) rule += " \\\n  " + escaped(file);
+  }
+  write_text(a.depfile, rule + "\n");
+}
+
+Json provenance(const Arguments& a, const Baked& baked, const Mesh& mesh,
+                const std::vector<std::string>& material_names, const std::array<uint64_t, 2>& source,
+                const MeasuredError& error) {
+  Json inputs = Json::array();
+  for (const auto& p : a.inputs) inputs.push_back(printable(p.filename().string()));
+  Json sources = Json::array();
+  for (const auto& files : mesh.sources) {
+    Json& list = sources.emplace_back(Json::array());
+    for (const auto& file : files) list.push_back(name_beside(file, files[0]));
+  }
+  static const std::map<Purpose, const char*> kPurposes = {{Purpose::kVisibility, "visibility"},
+                                                           {Purpose::kAo, "ao"},
+                                                           {Purpose::kDiffuse, "diffuse"},
+                                                           {Purpose::kGlossy, "glossy"},
+                                                           {Purpose::kAll, "all"}};
+  return {{"generator", std::string("lsp-bake ") + kProgramVersion},
+          {"inputs", inputs},
+          {"sources", sources},
+          {"origin", {mesh.origin.x, mesh.origin.y, mesh.origin.z}},
+          {"source_hash", hex128(source[0], source[1])},
+          {"options",
+           {{"base", a.base},
+            {"cells", baked.header.cells.cells_x
+                          ? std::max({baked.header.cells.cells_x, baked.header.cells.cells_y,
+                                      baked.header.cells.cells_z})
+                          : 0},
+            {"branching", a.branching},
+            {"levels", a.base == "ntree" ? a.levels : 0},
+            {"resolution", a.resolution},
+            {"depth", a.depths},
+            {"triangles", a.triangles},
+            {"samples", a.samples},
+            {"for", kPurposes.at(a.purpose)},
+            {"exact", !a.no_exact},
+            {"line_spaces", !a.no_line_spaces},
+            {"conservative", a.conservative},
+            {"directed", a.directed},
+            {"spatial_splits", !a.no_splits},
+            {"normal_angle", a.normal_angle},
+            {"plane_tolerance", a.plane_tolerance},
+            {"crease_angle", a.crease_angle}}},
+          {"triangles",
+           {{"read", mesh.primitive_count},
+            {"kept", mesh.triangles.size()},
+            {"degenerate", mesh.rejected.degenerate},
+            {"non_finite", mesh.rejected.non_finite},
+            {"out_of_range", mesh.rejected.out_of_range},
+            {"collapsed", mesh.rejected.collapsed},
+            {"invisible", mesh.rejected.invisible}}},
+          {"error", to_json(error)},
+          {"materials", material_names}};
+}
+
+}  // namespace lsp
