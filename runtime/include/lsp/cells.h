@@ -219,8 +219,10 @@ LSP_FN float lsp_cell_meet(LspPlane plane, vec3 origin, vec3 direction, bool beg
 }
 
 LSP_FN int lsp_cell_within(float p, int cell, int jump) {
-  int i = int(floor(p));
-  return i < cell - jump ? cell - jump : (i > cell + jump ? cell + jump : i);
+  float lo = float(cell - jump);
+  float hi = float(cell + jump);
+  float i = floor(p);
+  return int(i > lo ? (i < hi ? i : hi) : lo); /* of a NaN lo */
 }
 
 /* From cell to cell until a table answers, or a cell is to be traced exactly, or the ray is over. */

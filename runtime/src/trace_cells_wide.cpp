@@ -1,0 +1,746 @@
+// Approximate rays of a scene of cells across the lanes of a vector (Google Highway), compiled for each
+// instruction set and chosen when a trace is asked for.
+//
+// A pool of rays goes round by round: one cell a ray and round. A round has stages, of which each asks for
+// what the next one reads, for all rays of the pool, so that no ray waits for memory alone (as trace_group.h
+// does it for trees): to the next cell and its entry; what the entry says; the side of a split; the plane.
+// Rays that are done make room for new ones, which are in their first cell apart from the others: only these
+// look into origin tables. A ray that is to be traced exactly in a cell is, by the scalar text, once what it
+// reads first was asked for.
+//
+// This is a second text of what lsp/cells.h says, from lsp_advance on down to lsp_cell_meet, operation by
+// operation: nothing is contracted, comparisons and selections stand for min and max, so that lanes have the
+// bits of single rays. The rest (lsp_setup, lsp_begin, lsp_test_leaf, lsp_finish) is that text itself.
+// tests/runtime/ test_wide_cells.cpp compares the two.
+#include "trace_cells_wide.h"
+
+// Of Highway headers alone are used: what its library holds is the choice of a target, made below.
+#define HWY_IS_DEBUG_BUILD 0
+// For these, and for the one without vectors that Highway wants to have.
+#define HWY_DISABLED_TARGETS (~(HWY_AVX3 | HWY_AVX2 | HWY_SSE4 | HWY_NEON | HWY_EMU128 | HWY_SCALAR))
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "trace_cells_wide.cpp"
+#include <hwy/foreach_target.h>
+// What Highway compiles for must be known first.
+#include <hwy/highway.h>
+
+#include "trace_subset.h"
+#include "trace_variant.h"
+
+// What does not depend on the instruction set.
+#ifndef LSP_LANE_ORDERS
+#define LSP_LANE_ORDERS
+namespace lsp {
+
+// By a mask of lanes: the numbers of those that are set, a byte each, the first lowest. (Highway's own table
+// is copied to the stack at every use, by gcc 12.)
+struct LaneOrders {
+  uint64_t of[256];
+};
+constexpr LaneOrders lane_orders() {
+  LaneOrders orders{};
+  for (uint64_t mask = 0; mask < 256; ++mask)
+    for (uint64_t lane = 0, at = 0; lane < 8; ++lane)
+      if ((mask >> lane & 1) != 0) orders.of[mask] |= lane << (8 * at++);
+  return orders;
+}
+static constexpr LaneOrders kLaneOrders = lane_orders();
+
+}  // namespace lsp
+#endif
+
+#if HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_EMU128
+HWY_BEFORE_NAMESPACE();
+namespace lsp {
+namespace HWY_NAMESPACE {
+namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+using namespace subset;
+
+struct Text {
+#define LSP_CELLS
+#include "lsp/traverse.h"
+#undef LSP_CELLS
+};
+
+using DF = hn::ScalableTag<float>;
+using DI = hn::RebindToSigned<DF>;
+using DU = hn::RebindToUnsigned<DF>;
+using VF = hn::Vec<DF>;
+using VI = hn::Vec<DI>;
+using VU = hn::Vec<DU>;
+using MF = hn::Mask<DF>;
+using MI = hn::Mask<DI>;
+using MU = hn::Mask<DU>;
+constexpr DF df;
+constexpr DI di;
+constexpr DU du;
+constexpr size_t kLanes = hn::MaxLanes(DF());
+
+// Rays under way, a bit of a word each.
+constexpr size_t kPool = 64;
+using Bits = uint64_t;
+
+struct V3 {
+  VF x, y, z;
+};
+
+HWY_INLINE VF set(float x) { return hn::Set(df, x); }
+HWY_INLINE VI set_i(uint32_t x) { return hn::Set(di, static_cast<int32_t>(x)); }
+HWY_INLINE VU set_u(uint32_t x) { return hn::Set(du, x); }
+HWY_INLINE VF select(MF m, VF yes, VF no) { return hn::IfThenElse(m, yes, no); }
+HWY_INLINE VI select(MI m, VI yes, VI no) { return hn::IfThenElse(m, yes, no); }
+HWY_INLINE VU select(MU m, VU yes, VU no) { return hn::IfThenElse(m, yes, no); }
+HWY_INLINE MF as_float(MI m) { return hn::RebindMask(df, m); }
+HWY_INLINE MF as_float(MU m) { return hn::RebindMask(df, m); }
+HWY_INLINE MI as_int(MF m) { return hn::RebindMask(di, m); }
+HWY_INLINE MU as_uint(MF m) { return hn::RebindMask(du, m); }
+HWY_INLINE VF load(const float* from) { return hn::LoadU(df, from); }
+HWY_INLINE VI load(const int32_t* from) { return hn::LoadU(di, from); }
+HWY_INLINE VU load(const uint32_t* from) { return hn::LoadU(du, from); }
+HWY_INLINE void store(VF v, float* to) { hn::StoreU(v, df, to); }
+HWY_INLINE void store(VI v, int32_t* to) { hn::StoreU(v, di, to); }
+HWY_INLINE void store(VU v, uint32_t* to) { hn::StoreU(v, du, to); }
+
+HWY_INLINE Bits bits_of(MF mask) {
+  uint8_t bytes[8] = {};
+  hn::StoreMaskBits(df, mask, bytes);
+  uint64_t bits;
+  __builtin_memcpy(&bits, bytes, sizeof bits);
+  return bits & ((Bits{1} << kLanes) - 1);
+}
+HWY_INLINE MF mask_of(Bits bits) {
+  uint8_t bytes[8];
+  __builtin_memcpy(bytes, &bits, sizeof bytes);
+  return hn::LoadMaskBits(df, bytes);
+}
+HWY_INLINE MF first_lanes(size_t count) { return hn::FirstN(df, count < kLanes ? count : kLanes); }
+
+// A number of each bit that is set.
+#define LSP_FOR_BITS(i, bits)                                           \
+  for (Bits rest_##i = (bits); rest_##i != 0; rest_##i &= rest_##i - 1) \
+    if (const auto i = static_cast<size_t>(std::countr_zero(rest_##i)); true)
+
+// lsp_min, lsp_max and floor(q > 0 ? q : 0), held below n: lsp_cell_patch.
+HWY_INLINE VF max_of(VF a, VF b) { return select(hn::Lt(a, b), b, a); }
+HWY_INLINE VF patch_of(VF q, VF n) {
+  const VF i = hn::Floor(hn::IfThenElseZero(hn::Gt(q, hn::Zero(df)), q));
+  return select(hn::Lt(i, n), i, hn::Sub(n, set(1.0f)));
+}
+HWY_INLINE VF place_of(VF q, VF first) { return hn::Sub(hn::Mul(set(2.0f), hn::Sub(q, first)), set(1.0f)); }
+HWY_INLINE VF dot(const V3& a, const V3& b) {
+  return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));
+}
+HWY_INLINE VF along(const V3& v, MF is_x, MF is_y) { return select(is_x, v.x, select(is_y, v.y, v.z)); }
+HWY_INLINE V3 corner_of(VI x, VI y, VI z) {
+  return {hn::ConvertTo(df, x), hn::ConvertTo(df, y), hn::ConvertTo(df, z)};
+}
+// origin + direction * t.
+HWY_INLINE V3 point_at(const V3& o, const V3& d, VF t) {
+  return {hn::Add(o.x, hn::Mul(d.x, t)), hn::Add(o.y, hn::Mul(d.y, t)), hn::Add(o.z, hn::Mul(d.z, t))};
+}
+HWY_INLINE V3 minus(const V3& a, const V3& b) {
+  return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
+}
+
+// Arrays of the scene; one that is empty has a zero element, which is what is read beyond the end of any.
+struct Arrays {
+  const LspFilledCell* cells;
+  const LspPlane* planes;
+  const LspSplit* splits;
+  VU cell_count, plane_count, split_count, word_count;
+};
+template <typename T>
+HWY_INLINE const T* or_zero(const T* array, uint32_t count) {
+  static const T zero{};
+  return count != 0 ? array : &zero;
+}
+
+// Four words a lane, from first + lane's index * kWords on; zero where the index is beyond the end.
+template <size_t kWords>
+HWY_INLINE void load_records(const uint32_t* first, VU index, VU count, VU out[4]) {
+  const MU there = hn::Lt(index, count);
+  HWY_ALIGN uint32_t at[kLanes];
+  hn::Store(hn::IfThenElseZero(there, index), du, at);
+  const hn::CappedTag<uint32_t, 4> d4;
+  const hn::Repartition<uint64_t, DU> d64;
+  VU row[4];  // block b of row k: the record of lane 4 b + k
+  for (size_t k = 0; k < 4; ++k) {
+    const auto record = [&](size_t lane) HWY_ATTR {
+      return hn::LoadU(d4, first + static_cast<size_t>(at[lane]) * kWords);
+    };
+    if constexpr (kLanes == 4) {
+      row[k] = record(k);
+    } else if constexpr (kLanes == 8) {
+      row[k] = hn::Combine(du, record(4 + k), record(k));
+    } else {
+      const hn::Half<DU> half;
+      row[k] = hn::Combine(du, hn::Combine(half, record(12 + k), record(8 + k)),
+                           hn::Combine(half, record(4 + k), record(k)));
+    }
+  }
+  const auto low = [&](VU a, VU b) HWY_ATTR { return hn::BitCast(d64, hn::InterleaveLower(du, a, b)); };
+  const auto high = [&](VU a, VU b) HWY_ATTR { return hn::BitCast(d64, hn::InterleaveUpper(du, a, b)); };
+  const auto low_01 = low(row[0], row[1]), low_23 = low(row[2], row[3]);
+  const auto high_01 = high(row[0], row[1]), high_23 = high(row[2], row[3]);
+  out[0] = hn::BitCast(du, hn::InterleaveLower(d64, low_01, low_23));
+  out[1] = hn::BitCast(du, hn::InterleaveUpper(d64, low_01, low_23));
+  out[2] = hn::BitCast(du, hn::InterleaveLower(d64, high_01, high_23));
+  out[3] = hn::BitCast(du, hn::InterleaveUpper(d64, high_01, high_23));
+  for (size_t k = 0; k < 4; ++k) out[k] = hn::IfThenElseZero(there, out[k]);
+}
+
+// A word a lane; zero where the index is beyond the end. The index is below 2^31.
+HWY_INLINE VU load_words(const uint32_t* words, VU index, MU there) {
+  return hn::IfThenElseZero(there,
+                            hn::GatherIndex(du, words, hn::BitCast(di, hn::IfThenElseZero(there, index))));
+}
+
+// A hit whose triangle was asked for.
+struct Found {
+  uint32_t slot;
+  Text::LspBest best;
+};
+
+struct Tracer {
+  const lsp_scene& scene;
+  const LspCellGrid& grid;
+  const LspRay* rays;
+  LspHit* hits;
+  const uint64_t count;
+  const uint32_t dial;
+  const bool any_hit;
+  Arrays arrays;
+
+  // What stays with a ray lies in its slot, what the stages read in lanes, one after the other.
+  Text::LspSetup setup[2 * kPool];
+  uint64_t ray[2 * kPool];
+  uint8_t free_slot[2 * kPool];
+  size_t free_count = 0;
+  uint64_t next = 0;
+  size_t n = 0;
+  Found found[kPool];
+  size_t found_count = 0;
+  Text walker;
+
+  struct Lanes {
+    uint32_t slot[kPool + kLanes];
+    float origin[3][kPool + kLanes], direction[3][kPool + kLanes], inverse[3][kPool + kLanes];
+    float tmin[kPool + kLanes], tmax[kPool + kLanes], t_last[kPool + kLanes];
+    int32_t cell[3][kPool + kLanes];
+    float t[kPool + kLanes];
+    int32_t axis[kPool + kLanes];
+    uint32_t step[kPool + kLanes];
+  } lanes;
+  // Of this round. Where a ray goes next, its entry and its place there, then its plane.
+  int32_t next_cell[3][kPool + kLanes];
+  float t_out[kPool + kLanes];
+  int32_t axis_out[kPool + kLanes];
+  uint32_t index[kPool + kLanes];
+  uint32_t entry[kPool + kLanes];
+  float place[5][kPool + kLanes];
+  uint32_t plane[kPool + kLanes];
+  uint32_t plane_first[kPool + kLanes], plane_count[kPool + kLanes];
+  Bits filled, unknown, over, exact, split, meets;
+
+  HWY_INLINE V3 load_3(const float (&from)[3][kPool + kLanes], size_t i) const {
+    return {load(from[0] + i), load(from[1] + i), load(from[2] + i)};
+  }
+
+  // The ray of a slot hits nothing.
+  void end(uint32_t slot, uint32_t flags) {
+    LspHit hit = Text::lsp_no_hit();
+    hit.flags = flags;
+    hits[ray[slot]] = hit;
+    free_slot[free_count++] = static_cast<uint8_t>(slot);
+  }
+
+  // New rays into the lanes that are free.
+  void begin_rays() {
+    while (n < kPool && next < count) {
+      const uint64_t number = next++;
+      const uint8_t at = free_slot[free_count - 1];
+      Text::LspSetup& s = setup[at];
+      s = Text::lsp_setup(scene, rays[number]);
+      if (s.valid) walker.lsp_begin(scene, s, {any_hit ? LSP_TRACE_ANY_HIT : 0u, 0, false, dial});
+      if (!s.valid || walker.lsp_walk.ref == LSP_NONE) {
+        hits[number] = Text::lsp_no_hit();
+        continue;
+      }
+      --free_count;
+      ray[at] = number;
+      const Text::LspCellRay r = Text::lsp_cell_ray(grid, s);
+      for (int k = 0; k < 3; ++k) {
+        lanes.origin[k][n] = r.origin[k];
+        lanes.direction[k][n] = r.direction[k];
+        lanes.inverse[k][n] = r.inverse[k];
+        lanes.cell[k][n] = walker.lsp_walk.cell[k];
+      }
+      lanes.slot[n] = at;
+      lanes.tmin[n] = s.tmin;
+      lanes.tmax[n] = s.tmax;
+      lanes.t_last[n] = walker.lsp_walk.t_last;
+      lanes.t[n] = walker.lsp_walk.t;
+      lanes.axis[n] = walker.lsp_walk.axis;
+      lanes.step[n] = 0;
+      ++n;
+    }
+  }
+
+  // lsp_cell_origin, of lanes that begin in their cell; the others' entry is LSP_NONE.
+  HWY_INLINE VU find_in_origin_table(size_t i, MF begins, VU cell, const V3& from, VF to_u, VF to_v,
+                                     VI face) {
+    VU record[4];
+    load_records<sizeof(LspFilledCell) / 4>(&arrays.cells->sub_mask_lo,
+                                            select(as_uint(begins), cell, set_u(LSP_NONE)), arrays.cell_count,
+                                            record);
+    const VF sub_cells = set(static_cast<float>(grid.sub_cells));
+    const VF patches = set(static_cast<float>(grid.origin_patches));
+    const V3 p = {hn::Mul(from.x, sub_cells), hn::Mul(from.y, sub_cells), hn::Mul(from.z, sub_cells)};
+    const V3 sub = {patch_of(p.x, sub_cells), patch_of(p.y, sub_cells), patch_of(p.z, sub_cells)};
+    const VF u = hn::Mul(to_u, patches), v = hn::Mul(to_v, patches);
+    const VF patch_u = patch_of(u, patches), patch_v = patch_of(v, patches);
+    store(place_of(p.x, sub.x), place[0] + i);
+    store(place_of(p.y, sub.y), place[1] + i);
+    store(place_of(p.z, sub.z), place[2] + i);
+    store(place_of(u, patch_u), place[3] + i);
+    store(place_of(v, patch_v), place[4] + i);
+    // Numbers this small are exact as floats.
+    const VU number = whole(hn::Add(sub.x, hn::Mul(sub_cells, hn::Add(sub.y, hn::Mul(sub_cells, sub.z)))));
+    const VU patch = whole(hn::Add(patch_u, hn::Mul(patches, patch_v)));
+    const VU bit = hn::Shl(set_u(1), hn::And(number, set_u(31)));
+    const MU is_low = hn::Lt(number, set_u(32));
+    const VU mask = select(is_low, record[0], record[1]);
+    const VU before = hn::Add(hn::PopulationCount(hn::And(mask, hn::Sub(bit, set_u(1)))),
+                              hn::IfThenZeroElse(is_low, hn::PopulationCount(record[0])));
+    const VU table = hn::Add(record[2], before);
+    const VU at = hn::Add(hn::Mul(hn::Add(hn::Mul(table, set_u(6)), hn::BitCast(du, face)),
+                                  set_u(grid.origin_patches * grid.origin_patches)),
+                          patch);
+    const MU none = hn::Eq(hn::And(mask, bit), hn::Zero(du));
+    return select(none, set_u(LSP_NONE), hn::Add(set_u(grid.origin_entry_first), at));
+  }
+
+  static HWY_INLINE VU whole(VF x) { return hn::BitCast(du, hn::ConvertTo(di, x)); }
+
+  // lsp_cell_far. Places go where `lanes_of_far` says.
+  HWY_INLINE VU find_in_far_table(size_t i, MF asked, VU cell, VF from_u, VF from_v, VF to_u, VF to_v,
+                                  VI face_in, VI face_out) {
+    const VF patches = set(static_cast<float>(grid.far_patches));
+    const VF at[4] = {hn::Mul(from_u, patches), hn::Mul(from_v, patches), hn::Mul(to_u, patches),
+                      hn::Mul(to_v, patches)};
+    VF first[4];
+    for (size_t k = 0; k < 4; ++k) {
+      first[k] = patch_of(at[k], patches);
+      store(select(asked, place_of(at[k], first[k]), load(place[k] + i)), place[k] + i);
+    }
+    store(hn::IfThenZeroElse(asked, load(place[4] + i)), place[4] + i);
+    const VU patch_in = whole(hn::Add(first[0], hn::Mul(patches, first[1])));
+    const VU patch_out = whole(hn::Add(first[2], hn::Mul(patches, first[3])));
+    // LSP_SHAFT_INDEX. A mask is -1.
+    const uint32_t of_face = grid.far_patches * grid.far_patches;
+    const VI other = hn::Add(face_out, hn::VecFromMask(di, hn::Gt(face_out, face_in)));
+    const VU faces = hn::BitCast(du, hn::Add(hn::Mul(face_in, set_i(5)), other));
+    const VU shaft =
+        hn::Add(hn::Mul(hn::Add(hn::Mul(faces, set_u(of_face)), patch_in), set_u(of_face)), patch_out);
+    const VU entry_of = hn::Add(hn::Mul(cell, set_u(30u * of_face * of_face)), shaft);
+    return select(hn::RebindMask(du, hn::Eq(face_in, face_out)), set_u(LSP_NONE), entry_of);
+  }
+
+  // The loop of lsp_advance, once, up to the entry of a filled cell. kFirst: in cells that rays begin in.
+  template <bool kFirst>
+  HWY_INLINE void advance(size_t i, size_t end_of_lanes) {
+    const V3 o = load_3(lanes.origin, i), d = load_3(lanes.direction, i), inverse = load_3(lanes.inverse, i);
+    const VI x = load(lanes.cell[0] + i), y = load(lanes.cell[1] + i), z = load(lanes.cell[2] + i);
+    const VF t = load(lanes.t + i);
+    const VI axis = load(lanes.axis + i);
+    const MF here = first_lanes(end_of_lanes - i);
+    const MU in_time = hn::Lt(load(lanes.step + i), set_u(grid.cells_x + grid.cells_y + grid.cells_z));
+    const MU inside = hn::And(hn::And(hn::Lt(hn::BitCast(du, x), set_u(grid.cells_x)),
+                                      hn::Lt(hn::BitCast(du, y), set_u(grid.cells_y))),
+                              hn::Lt(hn::BitCast(du, z), set_u(grid.cells_z)));
+    const MF going =
+        hn::And(hn::And(here, as_float(hn::And(in_time, inside))), hn::Lt(t, load(lanes.t_last + i)));
+    if (const Bits ended = bits_of(hn::AndNot(going, here)); ended != 0) {
+      const Bits complete = bits_of(as_float(in_time));
+      LSP_FOR_BITS(k, ended) end(lanes.slot[i + k], (complete >> k & 1) != 0 ? 0 : LSP_HIT_INCOMPLETE);
+      over |= ended << i;
+    }
+    const VI of_grid = hn::Add(hn::Mul(hn::Add(hn::Mul(z, set_i(grid.cells_y)), y), set_i(grid.cells_x)), x);
+    const VU word = load_words(scene.cell_words, hn::BitCast(du, of_grid), as_uint(going));
+    const MI is_filled = hn::Lt(hn::BitCast(di, word), hn::Zero(di));
+    const VI jump = hn::IfThenZeroElse(is_filled, hn::BitCast(di, hn::And(word, set_u(LSP_CELL_MAX_JUMP))));
+    const VI jump_1 = hn::Add(jump, set_i(1));
+    const MF back[3] = {hn::Lt(inverse.x, hn::Zero(df)), hn::Lt(inverse.y, hn::Zero(df)),
+                        hn::Lt(inverse.z, hn::Zero(df))};
+    const auto side = [&](VI c, size_t k)
+                          HWY_ATTR { return select(as_int(back[k]), hn::Sub(c, jump), hn::Add(c, jump_1)); };
+    const V3 plane_of = corner_of(side(x, 0), side(y, 1), side(z, 2));
+    const V3 t_side = {hn::Mul(hn::Sub(plane_of.x, o.x), inverse.x),
+                       hn::Mul(hn::Sub(plane_of.y, o.y), inverse.y),
+                       hn::Mul(hn::Sub(plane_of.z, o.z), inverse.z)};
+    const MF x_le_y = hn::Le(t_side.x, t_side.y);
+    const MF out_x = hn::And(x_le_y, hn::Le(t_side.x, t_side.z));
+    const MF out_y = hn::AndNot(x_le_y, hn::Le(t_side.y, t_side.z));
+    const VI axis_to = hn::IfThenZeroElse(as_int(out_x), select(as_int(out_y), set_i(1), set_i(2)));
+    const VF t_to = max_of(along(t_side, out_x, out_y), t);
+    const V3 point = point_at(o, d, t_to);
+    const auto next = [&](VI c, VF p, MF by_it, size_t k) HWY_ATTR {
+      const VI beyond = select(as_int(back[k]), hn::Sub(c, jump_1), hn::Add(c, jump_1));
+      const VF lo = hn::ConvertTo(df, hn::Sub(c, jump)), hi = hn::ConvertTo(df, hn::Add(c, jump));
+      const VF cell_of = hn::Floor(p);
+      const VF within = select(hn::Gt(cell_of, lo), select(hn::Lt(cell_of, hi), cell_of, hi), lo);
+      store(select(as_int(by_it), beyond, hn::ConvertTo(di, within)), next_cell[k] + i);
+    };
+    next(x, point.x, out_x, 0);
+    next(y, point.y, out_y, 1);
+    next(z, point.z, hn::Not(hn::Or(out_x, out_y)), 2);
+    store(t_to, t_out + i);
+    store(axis_to, axis_out + i);
+    const MF looks = as_float(is_filled);
+    const Bits look_bits = bits_of(looks);
+    if (look_bits == 0) return;
+    filled |= look_bits << i;
+
+    const VU cell = hn::And(word, set_u(~LSP_CELL_FILLED));
+    const V3 corner = corner_of(x, y, z);
+    const V3 from = minus(point_at(o, d, t), corner), to = minus(point, corner);
+    const auto face = [&](VI a, MF is_x, MF is_y, VI at_back, VI ahead) HWY_ATTR {
+      const MF goes_back = hn::Or(hn::And(is_x, back[0]),
+                                  hn::Or(hn::And(is_y, back[1]), hn::AndNot(hn::Or(is_x, is_y), back[2])));
+      return hn::Add(hn::Add(a, a), select(as_int(goes_back), at_back, ahead));
+    };
+    const VI zero = hn::Zero(di), one = set_i(1);
+    const VI face_out = face(axis_to, out_x, out_y, zero, one);
+    const VF to_u = select(out_x, to.y, to.x);
+    const VF to_v = select(hn::Or(out_x, out_y), to.z, to.y);
+    VU found_entry = set_u(LSP_NONE);
+    MF far = looks;
+    V3 entered = from;
+    VI axis_in = axis;
+    if constexpr (kFirst) {
+      const MF begins = hn::And(looks, as_float(hn::Lt(axis, zero)));
+      found_entry = find_in_origin_table(i, begins, cell, from, to_u, to_v, face_out);
+      const MF is_unknown = hn::And(begins, as_float(hn::Eq(found_entry, set_u(LSP_NONE))));
+      unknown |= bits_of(is_unknown) << i;
+      far = hn::Or(is_unknown, hn::AndNot(begins, looks));
+      // lsp_cell_through.
+      const V3 behind =
+          corner_of(select(as_int(back[0]), hn::Add(x, one), x), select(as_int(back[1]), hn::Add(y, one), y),
+                    select(as_int(back[2]), hn::Add(z, one), z));
+      const V3 t_in = {hn::Mul(hn::Sub(behind.x, o.x), inverse.x), hn::Mul(hn::Sub(behind.y, o.y), inverse.y),
+                       hn::Mul(hn::Sub(behind.z, o.z), inverse.z)};
+      const MF x_ge_y = hn::Ge(t_in.x, t_in.y);
+      const MF in_x = hn::And(x_ge_y, hn::Ge(t_in.x, t_in.z)),
+               in_y = hn::AndNot(x_ge_y, hn::Ge(t_in.y, t_in.z));
+      const V3 through = minus(point_at(o, d, along(t_in, in_x, in_y)), corner);
+      entered = {select(is_unknown, through.x, from.x), select(is_unknown, through.y, from.y),
+                 select(is_unknown, through.z, from.z)};
+      axis_in = select(as_int(is_unknown),
+                       hn::IfThenZeroElse(as_int(in_x), select(as_int(in_y), one, set_i(2))), axis);
+    }
+    if (!kFirst || bits_of(far) != 0) {
+      const MF in_x = as_float(hn::Eq(axis_in, zero)), in_y = as_float(hn::Eq(axis_in, one));
+      const VI face_in = face(axis_in, in_x, in_y, one, zero);
+      const VU far_entry =
+          find_in_far_table(i, far, cell, select(in_x, entered.y, entered.x),
+                            select(hn::Or(in_x, in_y), entered.z, entered.y), to_u, to_v, face_in, face_out);
+      found_entry = select(as_uint(far), far_entry, found_entry);
+    }
+    store(cell, index + i);
+    store(found_entry, entry + i);
+    LSP_FOR_BITS(k, look_bits) {
+      fetch(scene.entries, entry[i + k] >> 1u);
+      fetch(scene.filled_cells, index[i + k]);
+    }
+  }
+
+  // What the entries say.
+  HWY_INLINE void classify(size_t i) {
+    const MF looks = mask_of(filled >> i);
+    const VU at = load(entry + i);
+    const VU half = hn::ShiftRight<1>(at);
+    const MU there =
+        hn::And(hn::And(as_uint(looks), hn::Ne(at, set_u(LSP_NONE))), hn::Lt(half, arrays.word_count));
+    const VU word = load_words(scene.entries, half, there);
+    const MU is_odd = hn::Ne(hn::And(at, set_u(1)), hn::Zero(du));
+    VU said = select(is_odd, hn::ShiftRight<16>(word), hn::And(word, set_u(0xFFFF)));
+    said = select(hn::Eq(at, set_u(LSP_NONE)), set_u(LSP_ANSWER_EMPTY), said);
+    const MF begins = as_float(hn::Lt(load(lanes.axis + i), hn::Zero(di)));
+    said =
+        select(as_uint(mask_of(unknown >> i)), hn::Or(said, set_u(LSP_LOSS_UNKNOWN << LSP_LOSS_SHIFT)), said);
+    const VU limit = select(as_uint(begins), set_u(dial & 0xFFu), set_u(dial >> 8u));
+    const MF exactly = hn::AndNot(as_float(hn::Lt(hn::ShiftRight<LSP_LOSS_SHIFT>(said), limit)), looks);
+    const VU answer = hn::And(said, set_u(LSP_ANSWER_MASK));
+    const MF answers = hn::AndNot(exactly, hn::And(looks, as_float(hn::Lt(answer, set_u(LSP_ANSWER_LIMIT)))));
+    const Bits sky =
+        bits_of(hn::AndNot(exactly, hn::And(looks, as_float(hn::Eq(answer, set_u(LSP_ANSWER_SKY))))));
+    LSP_FOR_BITS(k, sky) end(lanes.slot[i + k], 0);
+    over |= sky << i;
+    const Bits exact_bits = bits_of(exactly);
+    exact |= exact_bits << i;
+    LSP_FOR_BITS(k, exact_bits) fetch_tree(index[i + k]);
+    const Bits answer_bits = bits_of(answers);
+    if (answer_bits == 0) return;
+
+    VU record[4];
+    load_records<sizeof(LspFilledCell) / 4>(&arrays.cells->plane_first, load(index + i), arrays.cell_count,
+                                            record);
+    const MU direct = hn::Lt(answer, record[1]);
+    store(record[0], plane_first + i);
+    store(record[1], plane_count + i);
+    store(hn::Add(select(direct, record[0], hn::Sub(record[2], record[1])), answer), plane + i);
+    const Bits direct_bits = bits_of(hn::And(answers, as_float(direct)));
+    meets |= direct_bits << i;
+    split |= (answer_bits & ~direct_bits) << i;
+    LSP_FOR_BITS(k, direct_bits) fetch_plane(plane[i + k]);
+    LSP_FOR_BITS(k, answer_bits & ~direct_bits) fetch(scene.splits, plane[i + k]);
+  }
+
+  HWY_INLINE void fetch_plane(uint32_t number) {
+    fetch(scene.planes, number);
+    fetch(scene.plane_records, number);
+  }
+  HWY_INLINE void fetch_tree(uint32_t cell) {
+    const LspFilledCell& tree = lsp_load_cell_tree(scene, cell);
+    fetch(scene.cell_nodes, tree.node_first);
+    fetch(scene.cell_nodes, tree.node_first + 4);
+    fetch(scene.cell_references, tree.reference_first);
+  }
+
+  // lsp_split_weight, of the six bits below `shift` bits from the top.
+  template <int kFromTop>
+  static HWY_INLINE VF weight(VU bits) {
+    return hn::ConvertTo(df, hn::ShiftRight<26>(hn::BitCast(di, hn::ShiftLeft<kFromTop>(bits))));
+  }
+
+  // The side of the splits: lsp_split_side, lsp_cell_plane.
+  HWY_INLINE void choose(size_t i) {
+    const MU asked = as_uint(mask_of(split >> i));
+    const VU number = load(plane + i);
+    const MU there = hn::And(asked, hn::Lt(number, arrays.split_count));
+    const VU twice = hn::Add(number, number);
+    const VU answers = load_words(&arrays.splits->answers, twice, there);
+    const VU weights = load_words(&arrays.splits->answers, hn::Add(twice, set_u(1)), there);
+    VF sum = weight<2>(answers);
+    sum = hn::Add(sum, hn::Mul(weight<26>(weights), load(place[0] + i)));
+    sum = hn::Add(sum, hn::Mul(weight<20>(weights), load(place[1] + i)));
+    sum = hn::Add(sum, hn::Mul(weight<14>(weights), load(place[2] + i)));
+    sum = hn::Add(sum, hn::Mul(weight<8>(weights), load(place[3] + i)));
+    sum = hn::Add(sum, hn::Mul(weight<2>(weights), load(place[4] + i)));
+    const MU first = as_uint(hn::Gt(sum, hn::Zero(df)));
+    const VU side = hn::And(select(first, answers, hn::ShiftRight<12>(answers)), set_u(LSP_SPLIT_MASK));
+    const Bits is_plane = bits_of(as_float(hn::And(asked, hn::Lt(side, load(plane_count + i)))));
+    store(select(asked, hn::Add(load(plane_first + i), side), number), plane + i);
+    meets |= is_plane << i;
+    LSP_FOR_BITS(k, is_plane) fetch_plane(plane[i + k]);
+  }
+
+  // Where the rays meet their planes: lsp_cell_meet.
+  HWY_INLINE void meet(size_t i) {
+    const MF asked = mask_of(meets >> i);
+    VU record[4];
+    load_records<sizeof(LspPlane) / 4>(reinterpret_cast<const uint32_t*>(arrays.planes), load(plane + i),
+                                       select(as_uint(asked), arrays.plane_count, hn::Zero(du)), record);
+    const V3 normal = {hn::BitCast(df, record[0]), hn::BitCast(df, record[1]), hn::BitCast(df, record[2])};
+    const V3 corner = corner_of(load(lanes.cell[0] + i), load(lanes.cell[1] + i), load(lanes.cell[2] + i));
+    const VF half = set(0.5f);
+    const V3 centre = {hn::Add(corner.x, half), hn::Add(corner.y, half), hn::Add(corner.z, half)};
+    const V3 origin = minus(load_3(lanes.origin, i), centre);
+    const VF t_in = load(lanes.t + i), t_to = load(t_out + i);
+    const VF tmin = load(lanes.tmin + i);
+    const VF t = hn::Div(hn::Sub(hn::BitCast(df, record[3]), dot(normal, origin)),
+                         dot(normal, load_3(lanes.direction, i)));
+    const VF slack = hn::Mul(set(LSP_CELL_SLACK), hn::Sub(t_to, t_in));
+    const MF begins = as_float(hn::Lt(load(lanes.axis + i), hn::Zero(di)));
+    const MF met = hn::And(
+        hn::And(asked, hn::Gt(t, tmin)),
+        hn::And(hn::Gt(t, select(begins, t_in, hn::Sub(t_in, slack))), hn::Le(t, hn::Add(t_to, slack))));
+    VF hit = select(hn::Lt(t, t_in), t_in, t);
+    hit = select(hn::Gt(hit, t_to), t_to, hit);
+    const Bits hit_bits =
+        bits_of(hn::And(met, hn::And(hn::Gt(hit, tmin), hn::Lt(hit, load(lanes.tmax + i)))));
+    if (hit_bits == 0) return;
+    over |= hit_bits << i;
+    HWY_ALIGN float hit_t[kLanes];
+    hn::Store(hit, df, hit_t);
+    LSP_FOR_BITS(k, hit_bits) {
+      Text::LspBest best = Text::lsp_no_best(setup[lanes.slot[i + k]]);
+      best.t = hit_t[k];
+      best.triangle = lsp_load_plane_record(scene, plane[i + k]);
+      best.flags = LSP_HIT_LINE_SPACE | (lanes.axis[i + k] < 0 ? LSP_HIT_ORIGIN_INSIDE : 0u);
+      add_found(lanes.slot[i + k], best);
+    }
+  }
+
+  HWY_INLINE void add_found(uint32_t slot, const Text::LspBest& best) {
+    fetch(scene.triangles, best.triangle);
+    if (scene.normals != nullptr) fetch(scene.normals, best.triangle);
+    found[found_count] = {slot, best};
+    found[found_count++].best.complete = true;
+  }
+
+  // In the cell that the ray goes through now.
+  void trace_exactly(size_t i) {
+    Text::LspWalk& walk = walker.lsp_walk;
+    walk.best.triangle = LSP_NONE;
+    walk.ref = index[i] | LSP_LEAF_BIT;
+    walk.exact_cell = {lanes.cell[0][i], lanes.cell[1][i], lanes.cell[2][i]};
+    walk.exact_t = lanes.t[i];
+    walk.t = t_out[i];
+    walk.any_hit = any_hit;
+    walker.lsp_test_leaf(scene, setup[lanes.slot[i]]);
+    if (walk.best.triangle == LSP_NONE) return;
+    over |= Bits{1} << i;
+    add_found(lanes.slot[i], walk.best);
+  }
+
+  // The answers of the rays that hit something in the round before.
+  void finish() {
+    for (size_t k = 0; k < found_count; ++k) {
+      const uint32_t slot = found[k].slot;
+      hits[ray[slot]] = Text::lsp_finish(scene, setup[slot], rays[ray[slot]], found[k].best);
+      free_slot[free_count++] = static_cast<uint8_t>(slot);
+    }
+    found_count = 0;
+  }
+
+  template <typename T, class Indices>
+  static HWY_INLINE void move(const T* from, T* to, size_t i, size_t at, Indices indices) {
+    store(hn::TableLookupLanes(load(from + i), indices), to + at);
+  }
+
+  // Lanes that are set, one after the other.
+  static HWY_INLINE VI lane_order(Bits bits) {
+    if constexpr (kLanes > 8) return hn::Compress(hn::Iota(di, 0), as_int(mask_of(bits)));
+    const hn::Rebind<uint8_t, DI> bytes;
+    return hn::PromoteTo(di, hn::LoadU(bytes, reinterpret_cast<const uint8_t*>(&kLaneOrders.of[bits & 255])));
+  }
+
+  // The rays that go on, to the cells they go to, in the first lanes.
+  void compact() {
+    size_t at = 0;
+    for (size_t i = 0; i < n; i += kLanes) {
+      const Bits on = lanes_of(~over, i) & ((n - i < kLanes ? Bits{1} << (n - i) : Bits{1} << kLanes) - 1);
+      const VI order = lane_order(on);
+      const auto of_f = hn::IndicesFromVec(df, order);
+      const auto of_i = hn::IndicesFromVec(di, order);
+      const auto of_u = hn::IndicesFromVec(du, order);
+      for (size_t k = 0; k < 3; ++k) {
+        move(lanes.origin[k], lanes.origin[k], i, at, of_f);
+        move(lanes.direction[k], lanes.direction[k], i, at, of_f);
+        move(lanes.inverse[k], lanes.inverse[k], i, at, of_f);
+        move(next_cell[k], lanes.cell[k], i, at, of_i);
+      }
+      move(lanes.tmin, lanes.tmin, i, at, of_f);
+      move(lanes.tmax, lanes.tmax, i, at, of_f);
+      move(lanes.t_last, lanes.t_last, i, at, of_f);
+      move(t_out, lanes.t, i, at, of_f);
+      move(axis_out, lanes.axis, i, at, of_i);
+      move(lanes.slot, lanes.slot, i, at, of_u);
+      store(hn::Add(hn::TableLookupLanes(load(lanes.step + i), of_u), set_u(1)), lanes.step + at);
+      at += static_cast<size_t>(std::popcount(on));
+    }
+    n = at;
+  }
+
+  void run() {
+    for (size_t k = 0; k < 2 * kPool; ++k) free_slot[free_count++] = static_cast<uint8_t>(k);
+    for (;;) {
+      filled = unknown = over = exact = split = meets = 0;
+      const size_t old = n;
+      for (size_t i = 0; i < old; i += kLanes) advance<false>(i, old);
+      begin_rays();
+      for (size_t i = old; i < n; i += kLanes) advance<true>(i, n);
+      if (n == 0 && found_count == 0) return;
+      for (size_t i = 0; i < n; i += kLanes)
+        if (lanes_of(filled, i) != 0) classify(i);
+      finish();
+      for (size_t i = 0; i < n; i += kLanes)
+        if (lanes_of(split, i) != 0) choose(i);
+      LSP_FOR_BITS(i, exact) trace_exactly(i);
+      for (size_t i = 0; i < n; i += kLanes)
+        if (lanes_of(meets, i) != 0) meet(i);
+      compact();
+    }
+  }
+  static HWY_INLINE Bits lanes_of(Bits bits, size_t i) { return bits >> i & ((Bits{1} << kLanes) - 1); }
+};
+
+void trace(const lsp_scene& scene, bool any_hit, uint32_t dial, const LspRay* rays, LspHit* hits,
+           uint64_t count) {
+  const LspHeader& header = *scene.header;
+  Tracer tracer{
+      scene,
+      header.cells,
+      rays,
+      hits,
+      count,
+      dial,
+      any_hit,
+      {or_zero(scene.filled_cells, header.filled_cell_count), or_zero(scene.planes, header.plane_count),
+       or_zero(scene.splits, header.split_count), set_u(header.filled_cell_count), set_u(header.plane_count),
+       set_u(header.split_count), set_u(header.entry_word_count)}};
+  tracer.run();
+}
+
+}  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace lsp
+HWY_AFTER_NAMESPACE();
+#endif
+
+#if HWY_ONCE
+namespace lsp {
+namespace {
+
+#if HWY_TARGETS & HWY_AVX3
+bool has_avx3() {
+  return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
+         __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw") &&
+         __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi2") && __builtin_cpu_supports("fma");
+}
+#endif
+#if HWY_TARGETS & HWY_AVX2
+bool has_avx2() {
+  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2") &&
+         __builtin_cpu_supports("fma");
+}
+#endif
+#if HWY_TARGETS & HWY_SSE4
+bool has_sse4() { return __builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("popcnt"); }
+#endif
+#if HWY_TARGETS & HWY_NEON
+bool has_neon() { return true; }
+#endif
+
+}  // namespace
+
+const WideCells kWideCells[] = {
+#if HWY_TARGETS & HWY_AVX3
+    {"AVX-512", has_avx3, N_AVX3::trace},
+#endif
+#if HWY_TARGETS & HWY_AVX2
+    {"AVX2", has_avx2, N_AVX2::trace},
+#endif
+#if HWY_TARGETS & HWY_SSE4
+    {"SSE4", has_sse4, N_SSE4::trace},
+#endif
+#if HWY_TARGETS & HWY_NEON
+    {"NEON", has_neon, N_NEON::trace},
+#endif
+    {nullptr, nullptr, nullptr}};
+
+const WideCells* wide_cells(const lsp_scene& scene) {
+  const LspHeader& header = *scene.header;
+  // Indices of words are signed in a gather.
+  constexpr uint32_t kReach = 1u << 30;
+  if (header.entry_word_count >= kReach || header.split_count >= kReach) return nullptr;
+  for (const WideCells* wide = kWideCells; wide->name != nullptr; ++wide)
+    if (wide->runs_here()) return wide;
+  return nullptr;
+}
+
+}  // namespace lsp
+#endif
