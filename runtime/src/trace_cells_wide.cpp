@@ -1,18 +1,20 @@
 // Approximate rays of a scene of cells across the lanes of a vector (Google Highway), compiled for each
 // instruction set and chosen when a trace is asked for.
 //
-// A pool of rays goes round by round: one cell a ray and round. A round has stages, of which each asks for
-// what the next one reads, for all rays of the pool, so that no ray waits for memory alone (as trace_group.h
-// does it for trees): to the next cell and its entry; what the entry says; the side of a split; the plane.
-// Rays that are done make room for new ones, which are in their first cell apart from the others: only these
-// look into origin tables. A ray that is to be traced exactly in a cell is, by the scalar text, once what it
-// reads first was asked for.
+// A pool of rays goes round by round, one cell a ray and round. A round has stages, and each asks for what
+// the next one reads, for all rays of the pool, so that no ray waits for memory alone (as trace_group.h does
+// it for trees): to the next cell and its entry; what the entry says; the side of a split; the plane. Rays
+// that are done make room for new ones, whose first cells are looked at apart from the others': only there
+// origin tables are asked. A ray that is to be traced exactly in a cell is, by the text for single rays, once
+// what it reads first was asked for.
 //
-// This is a second text of what lsp/cells.h says, from lsp_advance on down to lsp_cell_meet, operation by
-// operation: nothing is contracted, comparisons and selections stand for min and max, so that lanes have the
-// bits of single rays. The rest (lsp_setup, lsp_begin, lsp_test_leaf, lsp_finish) is that text itself.
-// tests/runtime/ test_wide_cells.cpp compares the two.
+// This is a second text of what lsp/cells.h says from lsp_begin to lsp_cell_meet, and of the half of
+// lsp_setup (lsp/traverse.h) that this needs, operation by operation: nothing is contracted, and comparisons
+// and selections stand for min and max, so that a lane has the bits of a single ray. The rest (lsp_test_leaf,
+// lsp_finish) is that text itself. tests/agreement/test_wide_cells.cpp compares the two.
 #include "trace_cells_wide.h"
+
+#include <limits>
 
 // Of Highway headers alone are used: what its library holds is the choice of a target, made below.
 #define HWY_IS_DEBUG_BUILD 0
@@ -123,6 +125,7 @@ HWY_INLINE MF first_lanes(size_t count) { return hn::FirstN(df, count < kLanes ?
     if (const auto i = static_cast<size_t>(std::countr_zero(rest_##i)); true)
 
 // lsp_min, lsp_max and floor(q > 0 ? q : 0), held below n: lsp_cell_patch.
+HWY_INLINE VF min_of(VF a, VF b) { return select(hn::Lt(b, a), b, a); }
 HWY_INLINE VF max_of(VF a, VF b) { return select(hn::Lt(a, b), b, a); }
 HWY_INLINE VF patch_of(VF q, VF n) {
   const VF i = hn::Floor(hn::IfThenElseZero(hn::Gt(q, hn::Zero(df)), q));
@@ -199,7 +202,7 @@ HWY_INLINE VU load_words(const uint32_t* words, VU index, MU there) {
 
 // A hit whose triangle was asked for.
 struct Found {
-  uint32_t slot;
+  uint32_t ray;
   Text::LspBest best;
 };
 
@@ -208,83 +211,137 @@ struct Tracer {
   const LspCellGrid& grid;
   const LspRay* rays;
   LspHit* hits;
-  const uint64_t count;
+  const uint32_t count;
   const uint32_t dial;
   const bool any_hit;
   Arrays arrays;
 
-  // What stays with a ray lies in its slot, what the stages read in lanes, one after the other.
-  Text::LspSetup setup[2 * kPool];
-  uint64_t ray[2 * kPool];
-  uint8_t free_slot[2 * kPool];
-  size_t free_count = 0;
-  uint64_t next = 0;
+  // A value a lane, of rays under way: the first `n`.
+  template <typename T>
+  using Lanes = T[kPool + kLanes];
   size_t n = 0;
+  Lanes<uint32_t> ray_, step_;
+  Lanes<float> origin_[3], direction_[3], inverse_[3], tmin_, tmax_, t_, t_last_;
+  Lanes<int32_t> cell_[3], axis_;
+  // Of a round: where a ray goes next, its entry and its place there, its plane.
+  Lanes<int32_t> next_cell[3], axis_out;
+  Lanes<uint32_t> index, entry, plane_first, plane_count, plane;
+  Lanes<float> t_out, place[5];
+  Bits filled, unknown, over, exact, split, meets;
+
+  uint32_t next = 0;
   Found found[kPool];
   size_t found_count = 0;
   Text walker;
 
-  struct Lanes {
-    uint32_t slot[kPool + kLanes];
-    float origin[3][kPool + kLanes], direction[3][kPool + kLanes], inverse[3][kPool + kLanes];
-    float tmin[kPool + kLanes], tmax[kPool + kLanes], t_last[kPool + kLanes];
-    int32_t cell[3][kPool + kLanes];
-    float t[kPool + kLanes];
-    int32_t axis[kPool + kLanes];
-    uint32_t step[kPool + kLanes];
-  } lanes;
-  // Of this round. Where a ray goes next, its entry and its place there, then its plane.
-  int32_t next_cell[3][kPool + kLanes];
-  float t_out[kPool + kLanes];
-  int32_t axis_out[kPool + kLanes];
-  uint32_t index[kPool + kLanes];
-  uint32_t entry[kPool + kLanes];
-  float place[5][kPool + kLanes];
-  uint32_t plane[kPool + kLanes];
-  uint32_t plane_first[kPool + kLanes], plane_count[kPool + kLanes];
-  Bits filled, unknown, over, exact, split, meets;
-
-  HWY_INLINE V3 load_3(const float (&from)[3][kPool + kLanes], size_t i) const {
+  static HWY_INLINE V3 load_3(const Lanes<float> (&from)[3], size_t i) {
     return {load(from[0] + i), load(from[1] + i), load(from[2] + i)};
   }
+  static HWY_INLINE void store_3(const V3& v, Lanes<float> (&to)[3], size_t i) {
+    store(v.x, to[0] + i);
+    store(v.y, to[1] + i);
+    store(v.z, to[2] + i);
+  }
+  static HWY_INLINE Bits lanes_of(Bits bits, size_t i) { return bits >> i & ((Bits{1} << kLanes) - 1); }
 
-  // The ray of a slot hits nothing.
-  void end(uint32_t slot, uint32_t flags) {
-    LspHit hit = Text::lsp_no_hit();
-    hit.flags = flags;
-    hits[ray[slot]] = hit;
-    free_slot[free_count++] = static_cast<uint8_t>(slot);
+  void end(uint32_t number, uint32_t flags) {
+    hits[number] = Text::lsp_no_hit();
+    hits[number].flags = flags;
   }
 
-  // New rays into the lanes that are free.
+  static HWY_INLINE MF is_finite(VF x) {
+    const VU exponent = set_u(0x7F800000u);
+    return as_float(hn::Ne(hn::And(hn::BitCast(du, x), exponent), exponent));
+  }
+  static HWY_INLINE MF is_finite(const V3& v) {
+    return hn::And(is_finite(v.x), hn::And(is_finite(v.y), is_finite(v.z)));
+  }
+  static HWY_INLINE VF no_trifle(VF d) {
+    return hn::IfThenZeroElse(hn::Lt(hn::Abs(d), set(8.6736174e-19f)), d);
+  }
+  static HWY_INLINE VF reciprocal(VF d) {
+    const MF is_zero = hn::Eq(d, hn::Zero(df));
+    return select(is_zero, set(1.2089258e24f), hn::Div(set(1.0f), select(is_zero, set(1.0f), d)));
+  }
+
+  // New rays into free lanes: what lsp_setup says of direction and interval, lsp_cell_ray. An invalid ray
+  // ends before it begins.
+  HWY_INLINE void set_up(size_t i) {
+    const VU number = hn::Iota(du, next);
+    VU record[8];
+    const auto* words = reinterpret_cast<const uint32_t*>(rays);
+    load_records<sizeof(LspRay) / 4>(words, number, set_u(count), record);
+    load_records<sizeof(LspRay) / 4>(words + 4, number, set_u(count), record + 4);
+    VF field[8];
+    for (size_t k = 0; k < 8; ++k) field[k] = hn::BitCast(df, record[k]);
+    const V3 o{field[0], field[1], field[2]}, d{field[4], field[5], field[6]};
+    const VF from = field[3], to = field[7];
+    const VF largest = max_of(max_of(hn::Abs(d.x), hn::Abs(d.y)), hn::Abs(d.z));
+    const VU stated = hn::ShiftRight<23>(hn::BitCast(du, largest));
+    const MU is_large = hn::Lt(set_u(253), stated);
+    const VU exponent = select(is_large, set_u(253), stated);
+    // A NaN of either end is not ordered.
+    const MF valid = hn::And(hn::And(is_finite(o), is_finite(d)),
+                             hn::And(hn::Le(from, to), as_float(hn::Ne(stated, hn::Zero(du)))));
+    const VF shrink = hn::BitCast(df, hn::ShiftLeft<23>(hn::Sub(set_u(254), exponent)));
+    const VF to_scaled = hn::BitCast(df, hn::ShiftLeft<23>(exponent));
+    const V3 scaled = {no_trifle(hn::Mul(d.x, shrink)), no_trifle(hn::Mul(d.y, shrink)),
+                       no_trifle(hn::Mul(d.z, shrink))};
+    const VF a_step = hn::Mul(hn::BitCast(df, set_u(1)), to_scaled);
+    const VF most = set(std::numeric_limits<float>::max());
+    const VF first = hn::Add(hn::Mul(from, to_scaled), a_step);
+    const VF last = min_of(hn::Sub(hn::Mul(min_of(to, most), to_scaled), a_step), most);
+    const VF per_size = set(grid.per_size), size = set(grid.size);
+    const V3 lo = {set(grid.lo.x), set(grid.lo.y), set(grid.lo.z)};
+    const V3 in_cells = minus(o, lo);
+    store_3({hn::Mul(in_cells.x, per_size), hn::Mul(in_cells.y, per_size), hn::Mul(in_cells.z, per_size)},
+            origin_, i);
+    store_3({hn::Mul(scaled.x, per_size), hn::Mul(scaled.y, per_size), hn::Mul(scaled.z, per_size)},
+            direction_, i);
+    store_3({hn::Mul(reciprocal(scaled.x), size), hn::Mul(reciprocal(scaled.y), size),
+             hn::Mul(reciprocal(scaled.z), size)},
+            inverse_, i);
+    store(first, tmin_ + i);
+    store(last, tmax_ + i);
+    store(number, ray_ + i);
+    store(hn::Zero(du), step_ + i);
+    begin(i, first, last, valid);
+  }
+
+  // lsp_begin.
+  HWY_INLINE void begin(size_t i, VF first, VF last, MF valid) {
+    const V3 o = load_3(origin_, i), inv = load_3(inverse_, i);
+    const VF zero = hn::Zero(df);
+    const V3 dims = {set(static_cast<float>(grid.cells_x)), set(static_cast<float>(grid.cells_y)),
+                     set(static_cast<float>(grid.cells_z))};
+    const V3 lo = minus({zero, zero, zero}, o), hi = minus(dims, o);
+    const V3 a = {hn::Mul(lo.x, inv.x), hn::Mul(lo.y, inv.y), hn::Mul(lo.z, inv.z)};
+    const V3 b = {hn::Mul(hi.x, inv.x), hn::Mul(hi.y, inv.y), hn::Mul(hi.z, inv.z)};
+    const V3 enters = {min_of(a.x, b.x), min_of(a.y, b.y), min_of(a.z, b.z)};
+    const VF t_in = max_of(max_of(enters.x, enters.y), enters.z);
+    const VF leaves = min_of(min_of(max_of(a.x, b.x), max_of(a.y, b.y)), max_of(a.z, b.z));
+    const MF outside = hn::Gt(t_in, first);
+    const VF begins = select(outside, t_in, first);
+    store(hn::IfThenElse(valid, min_of(leaves, last), set(-std::numeric_limits<float>::infinity())),
+          t_last_ + i);
+    store(begins, t_ + i);
+    const VI side = hn::IfThenZeroElse(as_int(hn::Eq(t_in, enters.x)),
+                                       select(as_int(hn::Eq(t_in, enters.y)), set_i(1), set_i(2)));
+    store(select(as_int(outside), side, set_i(LSP_NONE)), axis_ + i);
+    const V3 p = point_at(o, load_3(direction_, i), begins);
+    const VF half = set(0.5f);
+    store(hn::ConvertTo(di, min_of(max_of(p.x, zero), hn::Sub(dims.x, half))), cell_[0] + i);
+    store(hn::ConvertTo(di, min_of(max_of(p.y, zero), hn::Sub(dims.y, half))), cell_[1] + i);
+    store(hn::ConvertTo(di, min_of(max_of(p.z, zero), hn::Sub(dims.z, half))), cell_[2] + i);
+  }
+
+  // A vector of new rays at a time.
   void begin_rays() {
-    while (n < kPool && next < count) {
-      const uint64_t number = next++;
-      const uint8_t at = free_slot[free_count - 1];
-      Text::LspSetup& s = setup[at];
-      s = Text::lsp_setup(scene, rays[number]);
-      if (s.valid) walker.lsp_begin(scene, s, {any_hit ? LSP_TRACE_ANY_HIT : 0u, 0, false, dial});
-      if (!s.valid || walker.lsp_walk.ref == LSP_NONE) {
-        hits[number] = Text::lsp_no_hit();
-        continue;
-      }
-      --free_count;
-      ray[at] = number;
-      const Text::LspCellRay r = Text::lsp_cell_ray(grid, s);
-      for (int k = 0; k < 3; ++k) {
-        lanes.origin[k][n] = r.origin[k];
-        lanes.direction[k][n] = r.direction[k];
-        lanes.inverse[k][n] = r.inverse[k];
-        lanes.cell[k][n] = walker.lsp_walk.cell[k];
-      }
-      lanes.slot[n] = at;
-      lanes.tmin[n] = s.tmin;
-      lanes.tmax[n] = s.tmax;
-      lanes.t_last[n] = walker.lsp_walk.t_last;
-      lanes.t[n] = walker.lsp_walk.t;
-      lanes.axis[n] = walker.lsp_walk.axis;
-      lanes.step[n] = 0;
-      ++n;
+    while (n + kLanes <= kPool && next < count) {
+      set_up(n);
+      const uint32_t more = count - next < kLanes ? count - next : static_cast<uint32_t>(kLanes);
+      next += more;
+      n += more;
     }
   }
 
@@ -324,7 +381,7 @@ struct Tracer {
 
   static HWY_INLINE VU whole(VF x) { return hn::BitCast(du, hn::ConvertTo(di, x)); }
 
-  // lsp_cell_far. Places go where `lanes_of_far` says.
+  // lsp_cell_far, of lanes that are asked; the others keep their places.
   HWY_INLINE VU find_in_far_table(size_t i, MF asked, VU cell, VF from_u, VF from_v, VF to_u, VF to_v,
                                   VI face_in, VI face_out) {
     const VF patches = set(static_cast<float>(grid.far_patches));
@@ -351,20 +408,19 @@ struct Tracer {
   // The loop of lsp_advance, once, up to the entry of a filled cell. kFirst: in cells that rays begin in.
   template <bool kFirst>
   HWY_INLINE void advance(size_t i, size_t end_of_lanes) {
-    const V3 o = load_3(lanes.origin, i), d = load_3(lanes.direction, i), inverse = load_3(lanes.inverse, i);
-    const VI x = load(lanes.cell[0] + i), y = load(lanes.cell[1] + i), z = load(lanes.cell[2] + i);
-    const VF t = load(lanes.t + i);
-    const VI axis = load(lanes.axis + i);
+    const V3 o = load_3(origin_, i), d = load_3(direction_, i), inverse = load_3(inverse_, i);
+    const VI x = load(cell_[0] + i), y = load(cell_[1] + i), z = load(cell_[2] + i);
+    const VF t = load(t_ + i);
+    const VI axis = load(axis_ + i);
     const MF here = first_lanes(end_of_lanes - i);
-    const MU in_time = hn::Lt(load(lanes.step + i), set_u(grid.cells_x + grid.cells_y + grid.cells_z));
+    const MU in_time = hn::Lt(load(step_ + i), set_u(grid.cells_x + grid.cells_y + grid.cells_z));
     const MU inside = hn::And(hn::And(hn::Lt(hn::BitCast(du, x), set_u(grid.cells_x)),
                                       hn::Lt(hn::BitCast(du, y), set_u(grid.cells_y))),
                               hn::Lt(hn::BitCast(du, z), set_u(grid.cells_z)));
-    const MF going =
-        hn::And(hn::And(here, as_float(hn::And(in_time, inside))), hn::Lt(t, load(lanes.t_last + i)));
+    const MF going = hn::And(hn::And(here, as_float(hn::And(in_time, inside))), hn::Lt(t, load(t_last_ + i)));
     if (const Bits ended = bits_of(hn::AndNot(going, here)); ended != 0) {
       const Bits complete = bits_of(as_float(in_time));
-      LSP_FOR_BITS(k, ended) end(lanes.slot[i + k], (complete >> k & 1) != 0 ? 0 : LSP_HIT_INCOMPLETE);
+      LSP_FOR_BITS(k, ended) end(ray_[i + k], (complete >> k & 1) != 0 ? 0 : LSP_HIT_INCOMPLETE);
       over |= ended << i;
     }
     const VI of_grid = hn::Add(hn::Mul(hn::Add(hn::Mul(z, set_i(grid.cells_y)), y), set_i(grid.cells_x)), x);
@@ -467,7 +523,7 @@ struct Tracer {
     const MU is_odd = hn::Ne(hn::And(at, set_u(1)), hn::Zero(du));
     VU said = select(is_odd, hn::ShiftRight<16>(word), hn::And(word, set_u(0xFFFF)));
     said = select(hn::Eq(at, set_u(LSP_NONE)), set_u(LSP_ANSWER_EMPTY), said);
-    const MF begins = as_float(hn::Lt(load(lanes.axis + i), hn::Zero(di)));
+    const MF begins = as_float(hn::Lt(load(axis_ + i), hn::Zero(di)));
     said =
         select(as_uint(mask_of(unknown >> i)), hn::Or(said, set_u(LSP_LOSS_UNKNOWN << LSP_LOSS_SHIFT)), said);
     const VU limit = select(as_uint(begins), set_u(dial & 0xFFu), set_u(dial >> 8u));
@@ -476,7 +532,7 @@ struct Tracer {
     const MF answers = hn::AndNot(exactly, hn::And(looks, as_float(hn::Lt(answer, set_u(LSP_ANSWER_LIMIT)))));
     const Bits sky =
         bits_of(hn::AndNot(exactly, hn::And(looks, as_float(hn::Eq(answer, set_u(LSP_ANSWER_SKY))))));
-    LSP_FOR_BITS(k, sky) end(lanes.slot[i + k], 0);
+    LSP_FOR_BITS(k, sky) end(ray_[i + k], 0);
     over |= sky << i;
     const Bits exact_bits = bits_of(exactly);
     exact |= exact_bits << i;
@@ -544,40 +600,39 @@ struct Tracer {
     load_records<sizeof(LspPlane) / 4>(reinterpret_cast<const uint32_t*>(arrays.planes), load(plane + i),
                                        select(as_uint(asked), arrays.plane_count, hn::Zero(du)), record);
     const V3 normal = {hn::BitCast(df, record[0]), hn::BitCast(df, record[1]), hn::BitCast(df, record[2])};
-    const V3 corner = corner_of(load(lanes.cell[0] + i), load(lanes.cell[1] + i), load(lanes.cell[2] + i));
+    const V3 corner = corner_of(load(cell_[0] + i), load(cell_[1] + i), load(cell_[2] + i));
     const VF half = set(0.5f);
     const V3 centre = {hn::Add(corner.x, half), hn::Add(corner.y, half), hn::Add(corner.z, half)};
-    const V3 origin = minus(load_3(lanes.origin, i), centre);
-    const VF t_in = load(lanes.t + i), t_to = load(t_out + i);
-    const VF tmin = load(lanes.tmin + i);
-    const VF t = hn::Div(hn::Sub(hn::BitCast(df, record[3]), dot(normal, origin)),
-                         dot(normal, load_3(lanes.direction, i)));
+    const V3 origin = minus(load_3(origin_, i), centre);
+    const VF t_in = load(t_ + i), t_to = load(t_out + i);
+    const VF tmin = load(tmin_ + i);
+    const VF t =
+        hn::Div(hn::Sub(hn::BitCast(df, record[3]), dot(normal, origin)), dot(normal, load_3(direction_, i)));
     const VF slack = hn::Mul(set(LSP_CELL_SLACK), hn::Sub(t_to, t_in));
-    const MF begins = as_float(hn::Lt(load(lanes.axis + i), hn::Zero(di)));
+    const MF begins = as_float(hn::Lt(load(axis_ + i), hn::Zero(di)));
     const MF met = hn::And(
         hn::And(asked, hn::Gt(t, tmin)),
         hn::And(hn::Gt(t, select(begins, t_in, hn::Sub(t_in, slack))), hn::Le(t, hn::Add(t_to, slack))));
     VF hit = select(hn::Lt(t, t_in), t_in, t);
     hit = select(hn::Gt(hit, t_to), t_to, hit);
-    const Bits hit_bits =
-        bits_of(hn::And(met, hn::And(hn::Gt(hit, tmin), hn::Lt(hit, load(lanes.tmax + i)))));
+    const Bits hit_bits = bits_of(hn::And(met, hn::And(hn::Gt(hit, tmin), hn::Lt(hit, load(tmax_ + i)))));
     if (hit_bits == 0) return;
     over |= hit_bits << i;
     HWY_ALIGN float hit_t[kLanes];
     hn::Store(hit, df, hit_t);
     LSP_FOR_BITS(k, hit_bits) {
-      Text::LspBest best = Text::lsp_no_best(setup[lanes.slot[i + k]]);
+      Text::LspBest best{};
       best.t = hit_t[k];
       best.triangle = lsp_load_plane_record(scene, plane[i + k]);
-      best.flags = LSP_HIT_LINE_SPACE | (lanes.axis[i + k] < 0 ? LSP_HIT_ORIGIN_INSIDE : 0u);
-      add_found(lanes.slot[i + k], best);
+      best.flags = LSP_HIT_LINE_SPACE | (axis_[i + k] < 0 ? LSP_HIT_ORIGIN_INSIDE : 0u);
+      add_found(ray_[i + k], best);
     }
   }
 
-  HWY_INLINE void add_found(uint32_t slot, const Text::LspBest& best) {
+  HWY_INLINE void add_found(uint32_t number, const Text::LspBest& best) {
     fetch(scene.triangles, best.triangle);
     if (scene.normals != nullptr) fetch(scene.normals, best.triangle);
-    found[found_count] = {slot, best};
+    found[found_count] = {number, best};
     found[found_count++].best.complete = true;
   }
 
@@ -586,22 +641,21 @@ struct Tracer {
     Text::LspWalk& walk = walker.lsp_walk;
     walk.best.triangle = LSP_NONE;
     walk.ref = index[i] | LSP_LEAF_BIT;
-    walk.exact_cell = {lanes.cell[0][i], lanes.cell[1][i], lanes.cell[2][i]};
-    walk.exact_t = lanes.t[i];
+    walk.exact_cell = {cell_[0][i], cell_[1][i], cell_[2][i]};
+    walk.exact_t = t_[i];
     walk.t = t_out[i];
     walk.any_hit = any_hit;
-    walker.lsp_test_leaf(scene, setup[lanes.slot[i]]);
+    walker.lsp_test_leaf(scene, Text::lsp_setup(scene, rays[ray_[i]]));
     if (walk.best.triangle == LSP_NONE) return;
     over |= Bits{1} << i;
-    add_found(lanes.slot[i], walk.best);
+    add_found(ray_[i], walk.best);
   }
 
   // The answers of the rays that hit something in the round before.
   void finish() {
     for (size_t k = 0; k < found_count; ++k) {
-      const uint32_t slot = found[k].slot;
-      hits[ray[slot]] = Text::lsp_finish(scene, setup[slot], rays[ray[slot]], found[k].best);
-      free_slot[free_count++] = static_cast<uint8_t>(slot);
+      const LspRay& of = rays[found[k].ray];
+      hits[found[k].ray] = Text::lsp_finish(scene, Text::lsp_setup(scene, of), of, found[k].best);
     }
     found_count = 0;
   }
@@ -628,25 +682,24 @@ struct Tracer {
       const auto of_i = hn::IndicesFromVec(di, order);
       const auto of_u = hn::IndicesFromVec(du, order);
       for (size_t k = 0; k < 3; ++k) {
-        move(lanes.origin[k], lanes.origin[k], i, at, of_f);
-        move(lanes.direction[k], lanes.direction[k], i, at, of_f);
-        move(lanes.inverse[k], lanes.inverse[k], i, at, of_f);
-        move(next_cell[k], lanes.cell[k], i, at, of_i);
+        move(origin_[k], origin_[k], i, at, of_f);
+        move(direction_[k], direction_[k], i, at, of_f);
+        move(inverse_[k], inverse_[k], i, at, of_f);
+        move(next_cell[k], cell_[k], i, at, of_i);
       }
-      move(lanes.tmin, lanes.tmin, i, at, of_f);
-      move(lanes.tmax, lanes.tmax, i, at, of_f);
-      move(lanes.t_last, lanes.t_last, i, at, of_f);
-      move(t_out, lanes.t, i, at, of_f);
-      move(axis_out, lanes.axis, i, at, of_i);
-      move(lanes.slot, lanes.slot, i, at, of_u);
-      store(hn::Add(hn::TableLookupLanes(load(lanes.step + i), of_u), set_u(1)), lanes.step + at);
+      move(tmin_, tmin_, i, at, of_f);
+      move(tmax_, tmax_, i, at, of_f);
+      move(t_last_, t_last_, i, at, of_f);
+      move(t_out, t_, i, at, of_f);
+      move(axis_out, axis_, i, at, of_i);
+      move(ray_, ray_, i, at, of_u);
+      store(hn::Add(hn::TableLookupLanes(load(step_ + i), of_u), set_u(1)), step_ + at);
       at += static_cast<size_t>(std::popcount(on));
     }
     n = at;
   }
 
   void run() {
-    for (size_t k = 0; k < 2 * kPool; ++k) free_slot[free_count++] = static_cast<uint8_t>(k);
     for (;;) {
       filled = unknown = over = exact = split = meets = 0;
       const size_t old = n;
@@ -665,24 +718,31 @@ struct Tracer {
       compact();
     }
   }
-  static HWY_INLINE Bits lanes_of(Bits bits, size_t i) { return bits >> i & ((Bits{1} << kLanes) - 1); }
 };
 
 void trace(const lsp_scene& scene, bool any_hit, uint32_t dial, const LspRay* rays, LspHit* hits,
            uint64_t count) {
   const LspHeader& header = *scene.header;
-  Tracer tracer{
-      scene,
-      header.cells,
-      rays,
-      hits,
-      count,
-      dial,
-      any_hit,
-      {or_zero(scene.filled_cells, header.filled_cell_count), or_zero(scene.planes, header.plane_count),
-       or_zero(scene.splits, header.split_count), set_u(header.filled_cell_count), set_u(header.plane_count),
-       set_u(header.split_count), set_u(header.entry_word_count)}};
-  tracer.run();
+  const Arrays arrays = {or_zero(scene.filled_cells, header.filled_cell_count),
+                         or_zero(scene.planes, header.plane_count),
+                         or_zero(scene.splits, header.split_count),
+                         set_u(header.filled_cell_count),
+                         set_u(header.plane_count),
+                         set_u(header.split_count),
+                         set_u(header.entry_word_count)};
+  constexpr uint64_t kAtOnce = 1u << 30;  // numbers of rays have 32 bits
+  for (uint64_t first = 0; first < count; first += kAtOnce) {
+    const uint64_t rest = count - first;
+    Tracer tracer{scene,
+                  header.cells,
+                  rays + first,
+                  hits + first,
+                  static_cast<uint32_t>(rest < kAtOnce ? rest : kAtOnce),
+                  dial,
+                  any_hit,
+                  arrays};
+    tracer.run();
+  }
 }
 
 }  // namespace
