@@ -59,19 +59,38 @@ struct Tracer {
   template <typename T>
   using Lanes = T[kPool + kLanes];
   size_t n = 0;
-  Lanes<uint32_t> ray_, step_;
-  Lanes<float> origin_[3], direction_[3], inverse_[3], tmin_, tmax_, t_, t_last_;
-  Lanes<int32_t> cell_[3], axis_;
+  Lanes<uint32_t> ray_{}, step_{};
+  Lanes<float> origin_[3]{}, direction_[3]{}, inverse_[3]{}, tmin_{}, tmax_{}, t_{}, t_last_{};
+  Lanes<int32_t> cell_[3]{}, axis_{};
   // Of a round: where a ray goes next, its entry and its place there, its plane.
-  Lanes<int32_t> next_cell[3], axis_out;
-  Lanes<uint32_t> index, entry, plane_first, plane_count, plane;
-  Lanes<float> t_out, place[5];
-  Bits filled, unknown, over, exact, split, meets;
+  Lanes<int32_t> next_cell[3]{}, axis_out{};
+  Lanes<uint32_t> index{}, entry{}, plane_first{}, plane_count{}, plane{};
+  Lanes<float> t_out{}, place[5]{};
+  // Rays that look into a filled cell, of which some do not know what they lose there; that are done; that
+  // are to be traced exactly; whose answer is a split; that have a plane to meet.
+  Bits filled = 0, unknown = 0, over = 0, exact = 0, split = 0, meets = 0;
 
   uint32_t next = 0;
   Found found[kPool];
   size_t found_count = 0;
   ExactTrace turns[kTurns];
+
+  Tracer(const lsp_scene& scene, bool any_hit, uint32_t dial, const LspRay* rays, LspHit* hits,
+         uint32_t count)
+      : scene(scene),
+        grid(scene.header->cells),
+        rays(rays),
+        hits(hits),
+        count(count),
+        dial(dial),
+        any_hit(any_hit),
+        arrays{or_zero(scene.filled_cells, scene.header->filled_cell_count),
+               or_zero(scene.planes, scene.header->plane_count),
+               or_zero(scene.splits, scene.header->split_count),
+               set_u(scene.header->filled_cell_count),
+               set_u(scene.header->plane_count),
+               set_u(scene.header->split_count),
+               set_u(scene.header->entry_word_count)} {}
 
   static HWY_INLINE V3 load_3(const Lanes<float> (&from)[3], size_t i) {
     return {load(from[0] + i), load(from[1] + i), load(from[2] + i)};
@@ -581,25 +600,12 @@ struct Tracer {
 
 void trace(const lsp_scene& scene, bool any_hit, uint32_t dial, const LspRay* rays, LspHit* hits,
            uint64_t count) {
-  const LspHeader& header = *scene.header;
-  const Arrays arrays = {or_zero(scene.filled_cells, header.filled_cell_count),
-                         or_zero(scene.planes, header.plane_count),
-                         or_zero(scene.splits, header.split_count),
-                         set_u(header.filled_cell_count),
-                         set_u(header.plane_count),
-                         set_u(header.split_count),
-                         set_u(header.entry_word_count)};
   constexpr uint64_t kAtOnce = 1u << 30;  // numbers of rays have 32 bits
   for (uint64_t first = 0; first < count; first += kAtOnce) {
     const uint64_t rest = count - first;
-    Tracer tracer{scene,
-                  header.cells,
-                  rays + first,
-                  hits + first,
-                  static_cast<uint32_t>(rest < kAtOnce ? rest : kAtOnce),
-                  dial,
-                  any_hit,
-                  arrays};
+    Tracer tracer(scene, any_hit, dial, rays + first, hits + first,
+                  static_cast<uint32_t>(rest < kAtOnce ? rest : kAtOnce));
+    static_assert(sizeof tracer <= 20 * 1024);  // of the stack, as lsp/lsp.h says
     tracer.run();
   }
 }
