@@ -5,6 +5,9 @@
 #include "lsp/lsp.h"
 #include "trace_cells.h"
 #include "trace_loops.h"
+#ifdef LSP_SIMD
+#include "trace_cells_wide.h"
+#endif
 
 extern "C" uint32_t lsp_dial(const lsp_scene* scene, const lsp_trace_options* options) {
   // Without their triangles cells answer from tables alone.
@@ -58,6 +61,13 @@ extern "C" lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options*
                      "the file has no exact tree, trace it approximately or bake it without --no-exact");
   const bool partial = (features & LSP_FEATURE_COVERAGE) != 0;
   if (approximate && (features & LSP_FEATURE_CELLS) != 0) {
+#ifdef LSP_SIMD
+    const bool wide = !partial && counts == nullptr && count >= lsp::kFewRays;
+    if (const lsp::WideCells* loop = wide ? lsp::wide_cells(*scene) : nullptr; loop != nullptr) {
+      loop->trace(*scene, (options->flags & LSP_TRACE_ANY_HIT) != 0, lsp_dial(scene, options), rays, hits, count);
+      return LSP_OK;
+    }
+#endif
     lsp::TraceCells& trace = partial ? lsp::partial::trace_cells : lsp::solid::trace_cells;
     trace(*scene, (options->flags & LSP_TRACE_ANY_HIT) != 0, lsp_dial(scene, options), rays, hits, count,
           counts);

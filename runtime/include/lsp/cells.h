@@ -8,6 +8,9 @@
  * An entry that loses more than asked for is not heeded: the ray is traced exactly through this cell, in the cell's
  * own small tree, and goes on from there.
  *
+ * runtime/src/trace_cells_wide.cpp and wide_exact-inl.h state this a second time for rays in vector lanes, operation by
+ * operation: what changes here changes there.
+ *
  * Everything but the exact trace counts in cells: positions from the grid's lower corner, lengths in edges.
  *
  * Rounding. The grid's planes are crossed at t off by at most 4 u G edges along an axis (G cells, u = 2^-24), for a
@@ -219,8 +222,10 @@ LSP_FN float lsp_cell_meet(LspPlane plane, vec3 origin, vec3 direction, bool beg
 }
 
 LSP_FN int lsp_cell_within(float p, int cell, int jump) {
-  int i = int(floor(p));
-  return i < cell - jump ? cell - jump : (i > cell + jump ? cell + jump : i);
+  float lo = float(cell - jump);
+  float hi = float(cell + jump);
+  float i = floor(p);
+  return int(i > lo ? (i < hi ? i : hi) : lo); /* of a NaN lo */
 }
 
 /* From cell to cell until a table answers, or a cell is to be traced exactly, or the ray is over. */

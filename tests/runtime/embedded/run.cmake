@@ -9,7 +9,7 @@ endfunction()
 
 set(hidden CLI11 nlohmann_json TBB draco meshoptimizer embree GTest PNG Threads)
 if(LINKAGE STREQUAL "static")
-  set(how -DLSP_BY=subdirectory -DLSP_SOURCE_DIR=${SOURCE_DIR})
+  set(how -DLSP_BY=subdirectory -DLSP_SOURCE_DIR=${SOURCE_DIR} -DLSP_SIMD=OFF)
   set(can_unpack no)
   list(APPEND hidden PkgConfig Vulkan)
 else()

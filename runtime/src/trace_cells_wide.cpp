@@ -1,0 +1,671 @@
+// Approximate rays of a scene of cells across the lanes of a vector (Google Highway), compiled for each
+// instruction set and chosen when a trace is asked for.
+//
+// A pool of rays goes round by round, one cell a ray and round. A round has stages, and each asks for what
+// the next one reads, for all rays of the pool, so that no ray waits for memory alone (as trace_group.h does
+// it for trees): to the next cell and its entry; what the entry says; the side of a split; the plane. Rays
+// that are done make room for new ones, whose first cells are looked at apart from the others': only there
+// origin tables are asked. Rays that are to be traced exactly in a cell are, several in turn
+// (wide_exact-inl.h), once what they read first was asked for.
+//
+// This is a second text of what lsp/cells.h says from lsp_begin to lsp_cell_meet, and of the half of
+// lsp_setup (lsp/traverse.h) that this needs, operation by operation: nothing is contracted, and comparisons
+// and selections stand for min and max, so that a lane has the bits of a single ray. tests/agreement/
+// test_wide_cells.cpp compares the two.
+#include "trace_cells_wide.h"
+
+#include <limits>
+
+// Of Highway headers alone are used: what its library holds is the choice of a target, made below.
+#define HWY_IS_DEBUG_BUILD 0
+// For these, and for the one without vectors that Highway wants to have.
+#define HWY_DISABLED_TARGETS (~(HWY_AVX3 | HWY_AVX2 | HWY_SSE4 | HWY_NEON | HWY_EMU128 | HWY_SCALAR))
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "trace_cells_wide.cpp"
+#include <hwy/foreach_target.h>
+// What Highway compiles for must be known first.
+#include <hwy/highway.h>
+
+// Without vectors there is the loop of trace_cells.cpp.
+#if HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_EMU128
+#include "wide_exact-inl.h"
+#include "wide_lanes-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace lsp {
+namespace HWY_NAMESPACE {
+namespace {
+
+// Exact traces that take turns. With 16 it is the same, and asking for more of a tree before does not help.
+constexpr size_t kTurns = 8;
+
+// A hit whose triangle was asked for.
+struct Found {
+  uint32_t ray;
+  Text::LspBest best;
+};
+
+struct Tracer {
+  const lsp_scene& scene;
+  const LspCellGrid& grid;
+  const LspRay* rays;
+  LspHit* hits;
+  const uint32_t count;
+  const uint32_t dial;
+  const bool any_hit;
+  Arrays arrays;
+
+  // A value a lane, of rays under way: the first `n`.
+  template <typename T>
+  using Lanes = T[kPool + kLanes];
+  size_t n = 0;
+  Lanes<uint32_t> ray_{}, step_{};
+  Lanes<float> origin_[3]{}, direction_[3]{}, inverse_[3]{}, tmin_{}, tmax_{}, t_{}, t_last_{};
+  Lanes<int32_t> cell_[3]{}, axis_{};
+  // Of a round: where a ray goes next, its entry and its place there, its plane.
+  Lanes<int32_t> next_cell[3]{}, axis_out{};
+  Lanes<uint32_t> index{}, entry{}, plane_first{}, plane_count{}, plane{};
+  Lanes<float> t_out{}, place[5]{};
+  // Rays that look into a filled cell, of which some do not know what they lose there; that are done; that
+  // are to be traced exactly; whose answer is a split; that have a plane to meet.
+  Bits filled = 0, unknown = 0, over = 0, exact = 0, split = 0, meets = 0;
+
+  uint32_t next = 0;
+  Found found[kPool];
+  size_t found_count = 0;
+  ExactTrace turns[kTurns];
+
+  Tracer(const lsp_scene& scene, bool any_hit, uint32_t dial, const LspRay* rays, LspHit* hits,
+         uint32_t count)
+      : scene(scene),
+        grid(scene.header->cells),
+        rays(rays),
+        hits(hits),
+        count(count),
+        dial(dial),
+        any_hit(any_hit),
+        arrays{or_zero(scene.filled_cells, scene.header->filled_cell_count),
+               or_zero(scene.planes, scene.header->plane_count),
+               or_zero(scene.splits, scene.header->split_count),
+               set_u(scene.header->filled_cell_count),
+               set_u(scene.header->plane_count),
+               set_u(scene.header->split_count),
+               set_u(scene.header->entry_word_count)} {}
+
+  static HWY_INLINE V3 load_3(const Lanes<float> (&from)[3], size_t i) {
+    return {load(from[0] + i), load(from[1] + i), load(from[2] + i)};
+  }
+  static HWY_INLINE void store_3(const V3& v, Lanes<float> (&to)[3], size_t i) {
+    store(v.x, to[0] + i);
+    store(v.y, to[1] + i);
+    store(v.z, to[2] + i);
+  }
+  static HWY_INLINE Bits lanes_of(Bits bits, size_t i) { return bits >> i & ((Bits{1} << kLanes) - 1); }
+
+  void end(uint32_t number, uint32_t flags) {
+    hits[number] = Text::lsp_no_hit();
+    hits[number].flags = flags;
+  }
+
+  static HWY_INLINE MF is_finite(VF x) {
+    const VU exponent = set_u(0x7F800000u);
+    return as_float(hn::Ne(hn::And(hn::BitCast(du, x), exponent), exponent));
+  }
+  static HWY_INLINE MF is_finite(const V3& v) {
+    return hn::And(is_finite(v.x), hn::And(is_finite(v.y), is_finite(v.z)));
+  }
+  static HWY_INLINE VF no_trifle(VF d) {
+    return hn::IfThenZeroElse(hn::Lt(hn::Abs(d), set(8.6736174e-19f)), d);
+  }
+  static HWY_INLINE VF reciprocal(VF d) {
+    const MF is_zero = hn::Eq(d, hn::Zero(df));
+    return select(is_zero, set(1.2089258e24f), hn::Div(set(1.0f), select(is_zero, set(1.0f), d)));
+  }
+
+  // New rays into free lanes: what lsp_setup says of direction and interval, lsp_cell_ray. An invalid ray
+  // ends before it begins.
+  HWY_INLINE void set_up(size_t i) {
+    const VU number = hn::Iota(du, next);
+    VU record[8];
+    const auto* words = reinterpret_cast<const uint32_t*>(rays);
+    load_records<sizeof(LspRay) / 4>(words, number, set_u(count), record);
+    load_records<sizeof(LspRay) / 4>(words + 4, number, set_u(count), record + 4);
+    VF field[8];
+    for (size_t k = 0; k < 8; ++k) field[k] = hn::BitCast(df, record[k]);
+    const V3 o{field[0], field[1], field[2]}, d{field[4], field[5], field[6]};
+    const VF from = field[3], to = field[7];
+    const VF largest = max_of(max_of(hn::Abs(d.x), hn::Abs(d.y)), hn::Abs(d.z));
+    const VU stated = hn::ShiftRight<23>(hn::BitCast(du, largest));
+    const MU is_large = hn::Lt(set_u(253), stated);
+    const VU exponent = select(is_large, set_u(253), stated);
+    // A NaN of either end is not ordered.
+    const MF valid = hn::And(hn::And(is_finite(o), is_finite(d)),
+                             hn::And(hn::Le(from, to), as_float(hn::Ne(stated, hn::Zero(du)))));
+    const VF shrink = hn::BitCast(df, hn::ShiftLeft<23>(hn::Sub(set_u(254), exponent)));
+    const VF to_scaled = hn::BitCast(df, hn::ShiftLeft<23>(exponent));
+    const V3 scaled = {no_trifle(hn::Mul(d.x, shrink)), no_trifle(hn::Mul(d.y, shrink)),
+                       no_trifle(hn::Mul(d.z, shrink))};
+    const VF a_step = hn::Mul(hn::BitCast(df, set_u(1)), to_scaled);
+    const VF most = set(std::numeric_limits<float>::max());
+    const VF first = hn::Add(hn::Mul(from, to_scaled), a_step);
+    const VF last = min_of(hn::Sub(hn::Mul(min_of(to, most), to_scaled), a_step), most);
+    const VF per_size = set(grid.per_size), size = set(grid.size);
+    const V3 lo = {set(grid.lo.x), set(grid.lo.y), set(grid.lo.z)};
+    const V3 in_cells = minus(o, lo);
+    store_3({hn::Mul(in_cells.x, per_size), hn::Mul(in_cells.y, per_size), hn::Mul(in_cells.z, per_size)},
+            origin_, i);
+    store_3({hn::Mul(scaled.x, per_size), hn::Mul(scaled.y, per_size), hn::Mul(scaled.z, per_size)},
+            direction_, i);
+    store_3({hn::Mul(reciprocal(scaled.x), size), hn::Mul(reciprocal(scaled.y), size),
+             hn::Mul(reciprocal(scaled.z), size)},
+            inverse_, i);
+    store(first, tmin_ + i);
+    store(last, tmax_ + i);
+    store(number, ray_ + i);
+    store(hn::Zero(du), step_ + i);
+    begin(i, first, last, valid);
+  }
+
+  // lsp_begin.
+  HWY_INLINE void begin(size_t i, VF first, VF last, MF valid) {
+    const V3 o = load_3(origin_, i), inv = load_3(inverse_, i);
+    const VF zero = hn::Zero(df);
+    const V3 dims = {set(static_cast<float>(grid.cells_x)), set(static_cast<float>(grid.cells_y)),
+                     set(static_cast<float>(grid.cells_z))};
+    const V3 lo = minus({zero, zero, zero}, o), hi = minus(dims, o);
+    const V3 a = {hn::Mul(lo.x, inv.x), hn::Mul(lo.y, inv.y), hn::Mul(lo.z, inv.z)};
+    const V3 b = {hn::Mul(hi.x, inv.x), hn::Mul(hi.y, inv.y), hn::Mul(hi.z, inv.z)};
+    const V3 enters = {min_of(a.x, b.x), min_of(a.y, b.y), min_of(a.z, b.z)};
+    const VF t_in = max_of(max_of(enters.x, enters.y), enters.z);
+    const VF leaves = min_of(min_of(max_of(a.x, b.x), max_of(a.y, b.y)), max_of(a.z, b.z));
+    const MF outside = hn::Gt(t_in, first);
+    const VF begins = select(outside, t_in, first);
+    store(hn::IfThenElse(valid, min_of(leaves, last), set(-std::numeric_limits<float>::infinity())),
+          t_last_ + i);
+    store(begins, t_ + i);
+    const VI side = hn::IfThenZeroElse(as_int(hn::Eq(t_in, enters.x)),
+                                       select(as_int(hn::Eq(t_in, enters.y)), set_i(1), set_i(2)));
+    store(select(as_int(outside), side, set_i(LSP_NONE)), axis_ + i);
+    const V3 p = point_at(o, load_3(direction_, i), begins);
+    const VF half = set(0.5f);
+    store(hn::ConvertTo(di, min_of(max_of(p.x, zero), hn::Sub(dims.x, half))), cell_[0] + i);
+    store(hn::ConvertTo(di, min_of(max_of(p.y, zero), hn::Sub(dims.y, half))), cell_[1] + i);
+    store(hn::ConvertTo(di, min_of(max_of(p.z, zero), hn::Sub(dims.z, half))), cell_[2] + i);
+  }
+
+  // A vector of new rays at a time.
+  void begin_rays() {
+    while (n + kLanes <= kPool && next < count) {
+      set_up(n);
+      const uint32_t more = count - next < kLanes ? count - next : static_cast<uint32_t>(kLanes);
+      next += more;
+      n += more;
+    }
+  }
+
+  // lsp_cell_origin, of lanes that begin in their cell; the others' entry is LSP_NONE.
+  HWY_INLINE VU find_in_origin_table(size_t i, MF begins, VU cell, const V3& from, VF to_u, VF to_v,
+                                     VI face) {
+    VU record[4];
+    load_records<sizeof(LspFilledCell) / 4>(&arrays.cells->sub_mask_lo,
+                                            select(as_uint(begins), cell, set_u(LSP_NONE)), arrays.cell_count,
+                                            record);
+    const VF sub_cells = set(static_cast<float>(grid.sub_cells));
+    const VF patches = set(static_cast<float>(grid.origin_patches));
+    const V3 p = {hn::Mul(from.x, sub_cells), hn::Mul(from.y, sub_cells), hn::Mul(from.z, sub_cells)};
+    const V3 sub = {patch_of(p.x, sub_cells), patch_of(p.y, sub_cells), patch_of(p.z, sub_cells)};
+    const VF u = hn::Mul(to_u, patches), v = hn::Mul(to_v, patches);
+    const VF patch_u = patch_of(u, patches), patch_v = patch_of(v, patches);
+    store(place_of(p.x, sub.x), place[0] + i);
+    store(place_of(p.y, sub.y), place[1] + i);
+    store(place_of(p.z, sub.z), place[2] + i);
+    store(place_of(u, patch_u), place[3] + i);
+    store(place_of(v, patch_v), place[4] + i);
+    // Numbers this small are exact as floats.
+    const VU number = whole(hn::Add(sub.x, hn::Mul(sub_cells, hn::Add(sub.y, hn::Mul(sub_cells, sub.z)))));
+    const VU patch = whole(hn::Add(patch_u, hn::Mul(patches, patch_v)));
+    const VU bit = hn::Shl(set_u(1), hn::And(number, set_u(31)));
+    const MU is_low = hn::Lt(number, set_u(32));
+    const VU mask = select(is_low, record[0], record[1]);
+    const VU before = hn::Add(hn::PopulationCount(hn::And(mask, hn::Sub(bit, set_u(1)))),
+                              hn::IfThenZeroElse(is_low, hn::PopulationCount(record[0])));
+    const VU table = hn::Add(record[2], before);
+    const VU at = hn::Add(hn::Mul(hn::Add(hn::Mul(table, set_u(6)), hn::BitCast(du, face)),
+                                  set_u(grid.origin_patches * grid.origin_patches)),
+                          patch);
+    const MU none = hn::Eq(hn::And(mask, bit), hn::Zero(du));
+    return select(none, set_u(LSP_NONE), hn::Add(set_u(grid.origin_entry_first), at));
+  }
+
+  static HWY_INLINE VU whole(VF x) { return hn::BitCast(du, hn::ConvertTo(di, x)); }
+
+  // lsp_cell_far, of lanes that are asked; the others keep their places.
+  HWY_INLINE VU find_in_far_table(size_t i, MF asked, VU cell, VF from_u, VF from_v, VF to_u, VF to_v,
+                                  VI face_in, VI face_out) {
+    const VF patches = set(static_cast<float>(grid.far_patches));
+    const VF at[4] = {hn::Mul(from_u, patches), hn::Mul(from_v, patches), hn::Mul(to_u, patches),
+                      hn::Mul(to_v, patches)};
+    VF first[4];
+    for (size_t k = 0; k < 4; ++k) {
+      first[k] = patch_of(at[k], patches);
+      store(select(asked, place_of(at[k], first[k]), load(place[k] + i)), place[k] + i);
+    }
+    store(hn::IfThenZeroElse(asked, load(place[4] + i)), place[4] + i);
+    const VU patch_in = whole(hn::Add(first[0], hn::Mul(patches, first[1])));
+    const VU patch_out = whole(hn::Add(first[2], hn::Mul(patches, first[3])));
+    // LSP_SHAFT_INDEX. A mask is -1.
+    const uint32_t of_face = grid.far_patches * grid.far_patches;
+    const VI other = hn::Add(face_out, hn::VecFromMask(di, hn::Gt(face_out, face_in)));
+    const VU faces = hn::BitCast(du, hn::Add(hn::Mul(face_in, set_i(5)), other));
+    const VU shaft =
+        hn::Add(hn::Mul(hn::Add(hn::Mul(faces, set_u(of_face)), patch_in), set_u(of_face)), patch_out);
+    const VU entry_of = hn::Add(hn::Mul(cell, set_u(30u * of_face * of_face)), shaft);
+    return select(hn::RebindMask(du, hn::Eq(face_in, face_out)), set_u(LSP_NONE), entry_of);
+  }
+
+  // The loop of lsp_advance, once, up to the entry of a filled cell. kFirst: in cells that rays begin in.
+  template <bool kFirst>
+  HWY_INLINE void advance(size_t i, size_t end_of_lanes) {
+    const V3 o = load_3(origin_, i), d = load_3(direction_, i), inverse = load_3(inverse_, i);
+    const VI x = load(cell_[0] + i), y = load(cell_[1] + i), z = load(cell_[2] + i);
+    const VF t = load(t_ + i);
+    const VI axis = load(axis_ + i);
+    const MF here = first_lanes(end_of_lanes - i);
+    const MU in_time = hn::Lt(load(step_ + i), set_u(grid.cells_x + grid.cells_y + grid.cells_z));
+    const MU inside = hn::And(hn::And(hn::Lt(hn::BitCast(du, x), set_u(grid.cells_x)),
+                                      hn::Lt(hn::BitCast(du, y), set_u(grid.cells_y))),
+                              hn::Lt(hn::BitCast(du, z), set_u(grid.cells_z)));
+    const MF going = hn::And(hn::And(here, as_float(hn::And(in_time, inside))), hn::Lt(t, load(t_last_ + i)));
+    if (const Bits ended = bits_of(hn::AndNot(going, here)); ended != 0) {
+      const Bits complete = bits_of(as_float(in_time));
+      LSP_FOR_BITS(k, ended) end(ray_[i + k], (complete >> k & 1) != 0 ? 0 : LSP_HIT_INCOMPLETE);
+      over |= ended << i;
+    }
+    const VI of_grid = hn::Add(hn::Mul(hn::Add(hn::Mul(z, set_i(grid.cells_y)), y), set_i(grid.cells_x)), x);
+    const VU word = load_words(scene.cell_words, hn::BitCast(du, of_grid), as_uint(going));
+    const MI is_filled = hn::Lt(hn::BitCast(di, word), hn::Zero(di));
+    const VI jump = hn::IfThenZeroElse(is_filled, hn::BitCast(di, hn::And(word, set_u(LSP_CELL_MAX_JUMP))));
+    const VI jump_1 = hn::Add(jump, set_i(1));
+    const MF back[3] = {hn::Lt(inverse.x, hn::Zero(df)), hn::Lt(inverse.y, hn::Zero(df)),
+                        hn::Lt(inverse.z, hn::Zero(df))};
+    const auto side = [&](VI c, size_t k)
+                          HWY_ATTR { return select(as_int(back[k]), hn::Sub(c, jump), hn::Add(c, jump_1)); };
+    const V3 plane_of = corner_of(side(x, 0), side(y, 1), side(z, 2));
+    const V3 t_side = {hn::Mul(hn::Sub(plane_of.x, o.x), inverse.x),
+                       hn::Mul(hn::Sub(plane_of.y, o.y), inverse.y),
+                       hn::Mul(hn::Sub(plane_of.z, o.z), inverse.z)};
+    const MF x_le_y = hn::Le(t_side.x, t_side.y);
+    const MF out_x = hn::And(x_le_y, hn::Le(t_side.x, t_side.z));
+    const MF out_y = hn::AndNot(x_le_y, hn::Le(t_side.y, t_side.z));
+    const VI axis_to = hn::IfThenZeroElse(as_int(out_x), select(as_int(out_y), set_i(1), set_i(2)));
+    const VF t_to = max_of(along(t_side, out_x, out_y), t);
+    const V3 point = point_at(o, d, t_to);
+    const auto next = [&](VI c, VF p, MF by_it, size_t k) HWY_ATTR {
+      const VI beyond = select(as_int(back[k]), hn::Sub(c, jump_1), hn::Add(c, jump_1));
+      const VF lo = hn::ConvertTo(df, hn::Sub(c, jump)), hi = hn::ConvertTo(df, hn::Add(c, jump));
+      const VF cell_of = hn::Floor(p);
+      const VF within = select(hn::Gt(cell_of, lo), select(hn::Lt(cell_of, hi), cell_of, hi), lo);
+      store(select(as_int(by_it), beyond, hn::ConvertTo(di, within)), next_cell[k] + i);
+    };
+    next(x, point.x, out_x, 0);
+    next(y, point.y, out_y, 1);
+    next(z, point.z, hn::Not(hn::Or(out_x, out_y)), 2);
+    store(t_to, t_out + i);
+    store(axis_to, axis_out + i);
+    const MF looks = as_float(is_filled);
+    const Bits look_bits = bits_of(looks);
+    if (look_bits == 0) return;
+    filled |= look_bits << i;
+
+    const VU cell = hn::And(word, set_u(~LSP_CELL_FILLED));
+    const V3 corner = corner_of(x, y, z);
+    const V3 from = minus(point_at(o, d, t), corner), to = minus(point, corner);
+    const auto face = [&](VI a, MF is_x, MF is_y, VI at_back, VI ahead) HWY_ATTR {
+      const MF goes_back = hn::Or(hn::And(is_x, back[0]),
+                                  hn::Or(hn::And(is_y, back[1]), hn::AndNot(hn::Or(is_x, is_y), back[2])));
+      return hn::Add(hn::Add(a, a), select(as_int(goes_back), at_back, ahead));
+    };
+    const VI zero = hn::Zero(di), one = set_i(1);
+    const VI face_out = face(axis_to, out_x, out_y, zero, one);
+    const VF to_u = select(out_x, to.y, to.x);
+    const VF to_v = select(hn::Or(out_x, out_y), to.z, to.y);
+    VU found_entry = set_u(LSP_NONE);
+    MF far = looks;
+    V3 entered = from;
+    VI axis_in = axis;
+    if constexpr (kFirst) {
+      const MF begins = hn::And(looks, as_float(hn::Lt(axis, zero)));
+      found_entry = find_in_origin_table(i, begins, cell, from, to_u, to_v, face_out);
+      const MF is_unknown = hn::And(begins, as_float(hn::Eq(found_entry, set_u(LSP_NONE))));
+      unknown |= bits_of(is_unknown) << i;
+      far = hn::Or(is_unknown, hn::AndNot(begins, looks));
+      // lsp_cell_through.
+      const V3 behind =
+          corner_of(select(as_int(back[0]), hn::Add(x, one), x), select(as_int(back[1]), hn::Add(y, one), y),
+                    select(as_int(back[2]), hn::Add(z, one), z));
+      const V3 t_in = {hn::Mul(hn::Sub(behind.x, o.x), inverse.x), hn::Mul(hn::Sub(behind.y, o.y), inverse.y),
+                       hn::Mul(hn::Sub(behind.z, o.z), inverse.z)};
+      const MF x_ge_y = hn::Ge(t_in.x, t_in.y);
+      const MF in_x = hn::And(x_ge_y, hn::Ge(t_in.x, t_in.z)),
+               in_y = hn::AndNot(x_ge_y, hn::Ge(t_in.y, t_in.z));
+      const V3 through = minus(point_at(o, d, along(t_in, in_x, in_y)), corner);
+      entered = {select(is_unknown, through.x, from.x), select(is_unknown, through.y, from.y),
+                 select(is_unknown, through.z, from.z)};
+      axis_in = select(as_int(is_unknown),
+                       hn::IfThenZeroElse(as_int(in_x), select(as_int(in_y), one, set_i(2))), axis);
+    }
+    if (!kFirst || bits_of(far) != 0) {
+      const MF in_x = as_float(hn::Eq(axis_in, zero)), in_y = as_float(hn::Eq(axis_in, one));
+      const VI face_in = face(axis_in, in_x, in_y, one, zero);
+      const VU far_entry =
+          find_in_far_table(i, far, cell, select(in_x, entered.y, entered.x),
+                            select(hn::Or(in_x, in_y), entered.z, entered.y), to_u, to_v, face_in, face_out);
+      found_entry = select(as_uint(far), far_entry, found_entry);
+    }
+    store(cell, index + i);
+    store(found_entry, entry + i);
+    LSP_FOR_BITS(k, look_bits) {
+      fetch(scene.entries, entry[i + k] >> 1u);
+      fetch(scene.filled_cells, index[i + k]);
+    }
+  }
+
+  // What the entries say.
+  HWY_INLINE void classify(size_t i) {
+    const MF looks = mask_of(filled >> i);
+    const VU at = load(entry + i);
+    const VU half = hn::ShiftRight<1>(at);
+    const MU there =
+        hn::And(hn::And(as_uint(looks), hn::Ne(at, set_u(LSP_NONE))), hn::Lt(half, arrays.word_count));
+    const VU word = load_words(scene.entries, half, there);
+    const MU is_odd = hn::Ne(hn::And(at, set_u(1)), hn::Zero(du));
+    VU said = select(is_odd, hn::ShiftRight<16>(word), hn::And(word, set_u(0xFFFF)));
+    said = select(hn::Eq(at, set_u(LSP_NONE)), set_u(LSP_ANSWER_EMPTY), said);
+    const MF begins = as_float(hn::Lt(load(axis_ + i), hn::Zero(di)));
+    said =
+        select(as_uint(mask_of(unknown >> i)), hn::Or(said, set_u(LSP_LOSS_UNKNOWN << LSP_LOSS_SHIFT)), said);
+    const VU limit = select(as_uint(begins), set_u(dial & 0xFFu), set_u(dial >> 8u));
+    const MF exactly = hn::AndNot(as_float(hn::Lt(hn::ShiftRight<LSP_LOSS_SHIFT>(said), limit)), looks);
+    const VU answer = hn::And(said, set_u(LSP_ANSWER_MASK));
+    const MF answers = hn::AndNot(exactly, hn::And(looks, as_float(hn::Lt(answer, set_u(LSP_ANSWER_LIMIT)))));
+    const Bits sky =
+        bits_of(hn::AndNot(exactly, hn::And(looks, as_float(hn::Eq(answer, set_u(LSP_ANSWER_SKY))))));
+    LSP_FOR_BITS(k, sky) end(ray_[i + k], 0);
+    over |= sky << i;
+    const Bits exact_bits = bits_of(exactly);
+    exact |= exact_bits << i;
+    LSP_FOR_BITS(k, exact_bits) fetch_tree(index[i + k]);
+    const Bits answer_bits = bits_of(answers);
+    if (answer_bits == 0) return;
+
+    VU record[4];
+    load_records<sizeof(LspFilledCell) / 4>(&arrays.cells->plane_first, load(index + i), arrays.cell_count,
+                                            record);
+    const MU direct = hn::Lt(answer, record[1]);
+    store(record[0], plane_first + i);
+    store(record[1], plane_count + i);
+    store(hn::Add(select(direct, record[0], hn::Sub(record[2], record[1])), answer), plane + i);
+    const Bits direct_bits = bits_of(hn::And(answers, as_float(direct)));
+    meets |= direct_bits << i;
+    split |= (answer_bits & ~direct_bits) << i;
+    LSP_FOR_BITS(k, direct_bits) fetch_plane(plane[i + k]);
+    LSP_FOR_BITS(k, answer_bits & ~direct_bits) fetch(scene.splits, plane[i + k]);
+  }
+
+  HWY_INLINE void fetch_plane(uint32_t number) {
+    fetch(scene.planes, number);
+    fetch(scene.plane_records, number);
+  }
+  HWY_INLINE void fetch_tree(uint32_t cell) {
+    const LspFilledCell& tree = lsp_load_cell_tree(scene, cell);
+    fetch(scene.cell_nodes, tree.node_first);
+    fetch(scene.cell_nodes, tree.node_first + 4);
+    fetch(scene.cell_references, tree.reference_first);
+  }
+
+  // lsp_split_weight, of the six bits below `shift` bits from the top.
+  template <int kFromTop>
+  static HWY_INLINE VF weight(VU bits) {
+    return hn::ConvertTo(df, hn::ShiftRight<26>(hn::BitCast(di, hn::ShiftLeft<kFromTop>(bits))));
+  }
+
+  // The side of the splits: lsp_split_side, lsp_cell_plane.
+  HWY_INLINE void choose(size_t i) {
+    const MU asked = as_uint(mask_of(split >> i));
+    const VU number = load(plane + i);
+    const MU there = hn::And(asked, hn::Lt(number, arrays.split_count));
+    const VU twice = hn::Add(number, number);
+    const VU answers = load_words(&arrays.splits->answers, twice, there);
+    const VU weights = load_words(&arrays.splits->answers, hn::Add(twice, set_u(1)), there);
+    VF sum = weight<2>(answers);
+    sum = hn::Add(sum, hn::Mul(weight<26>(weights), load(place[0] + i)));
+    sum = hn::Add(sum, hn::Mul(weight<20>(weights), load(place[1] + i)));
+    sum = hn::Add(sum, hn::Mul(weight<14>(weights), load(place[2] + i)));
+    sum = hn::Add(sum, hn::Mul(weight<8>(weights), load(place[3] + i)));
+    sum = hn::Add(sum, hn::Mul(weight<2>(weights), load(place[4] + i)));
+    const MU first = as_uint(hn::Gt(sum, hn::Zero(df)));
+    const VU side = hn::And(select(first, answers, hn::ShiftRight<12>(answers)), set_u(LSP_SPLIT_MASK));
+    const Bits is_plane = bits_of(as_float(hn::And(asked, hn::Lt(side, load(plane_count + i)))));
+    store(select(asked, hn::Add(load(plane_first + i), side), number), plane + i);
+    meets |= is_plane << i;
+    LSP_FOR_BITS(k, is_plane) fetch_plane(plane[i + k]);
+  }
+
+  // Where the rays meet their planes: lsp_cell_meet.
+  HWY_INLINE void meet(size_t i) {
+    const MF asked = mask_of(meets >> i);
+    VU record[4];
+    load_records<sizeof(LspPlane) / 4>(reinterpret_cast<const uint32_t*>(arrays.planes), load(plane + i),
+                                       select(as_uint(asked), arrays.plane_count, hn::Zero(du)), record);
+    const V3 normal = {hn::BitCast(df, record[0]), hn::BitCast(df, record[1]), hn::BitCast(df, record[2])};
+    const V3 corner = corner_of(load(cell_[0] + i), load(cell_[1] + i), load(cell_[2] + i));
+    const VF half = set(0.5f);
+    const V3 centre = {hn::Add(corner.x, half), hn::Add(corner.y, half), hn::Add(corner.z, half)};
+    const V3 origin = minus(load_3(origin_, i), centre);
+    const VF t_in = load(t_ + i), t_to = load(t_out + i);
+    const VF tmin = load(tmin_ + i);
+    const VF t =
+        hn::Div(hn::Sub(hn::BitCast(df, record[3]), dot(normal, origin)), dot(normal, load_3(direction_, i)));
+    const VF slack = hn::Mul(set(LSP_CELL_SLACK), hn::Sub(t_to, t_in));
+    const MF begins = as_float(hn::Lt(load(axis_ + i), hn::Zero(di)));
+    const MF met = hn::And(
+        hn::And(asked, hn::Gt(t, tmin)),
+        hn::And(hn::Gt(t, select(begins, t_in, hn::Sub(t_in, slack))), hn::Le(t, hn::Add(t_to, slack))));
+    VF hit = select(hn::Lt(t, t_in), t_in, t);
+    hit = select(hn::Gt(hit, t_to), t_to, hit);
+    const Bits hit_bits = bits_of(hn::And(met, hn::And(hn::Gt(hit, tmin), hn::Lt(hit, load(tmax_ + i)))));
+    if (hit_bits == 0) return;
+    over |= hit_bits << i;
+    HWY_ALIGN float hit_t[kLanes];
+    hn::Store(hit, df, hit_t);
+    LSP_FOR_BITS(k, hit_bits) {
+      Text::LspBest best{};
+      best.t = hit_t[k];
+      best.triangle = lsp_load_plane_record(scene, plane[i + k]);
+      best.flags = LSP_HIT_LINE_SPACE | (axis_[i + k] < 0 ? LSP_HIT_ORIGIN_INSIDE : 0u);
+      add_found(ray_[i + k], best);
+    }
+  }
+
+  HWY_INLINE void add_found(uint32_t number, const Text::LspBest& best) {
+    fetch(scene.triangles, best.triangle);
+    if (scene.normals != nullptr) fetch(scene.normals, best.triangle);
+    found[found_count] = {number, best};
+    found[found_count++].best.complete = true;
+  }
+
+  // The rays that are to be traced exactly, each in its cell, kTurns of them in turn.
+  void trace_exactly() {
+    uint32_t waiting[kPool];
+    size_t left = 0;
+    LSP_FOR_BITS(k, exact) waiting[left++] = static_cast<uint32_t>(k);
+    ExactTrace* on[kTurns];
+    size_t on_count = 0;
+    const auto begin_one = [&](ExactTrace* trace) HWY_ATTR {
+      while (left != 0) {
+        const uint32_t k = waiting[--left];
+        trace->begin(scene, rays[ray_[k]], k, index[k], {cell_[0][k], cell_[1][k], cell_[2][k]}, t_[k],
+                     t_out[k]);
+        if (trace->descend(scene)) return true;
+      }
+      return false;
+    };
+    for (size_t k = 0; k < kTurns && begin_one(&turns[k]); ++k) on[on_count++] = &turns[k];
+    while (on_count != 0) {
+      size_t kept = 0;
+      for (size_t k = 0; k < on_count; ++k) {
+        ExactTrace* trace = on[k];
+        bool goes_on = trace->test(scene, any_hit) && trace->descend(scene);
+        if (!goes_on) {
+          if (trace->best().triangle != LSP_NONE) {
+            over |= Bits{1} << trace->lane();
+            add_found(ray_[trace->lane()], trace->best());
+          }
+          goes_on = begin_one(trace);
+        }
+        if (goes_on) on[kept++] = trace;
+      }
+      on_count = kept;
+    }
+  }
+
+  // The answers of the rays that hit something in the round before.
+  void finish() {
+    for (size_t k = 0; k < found_count; ++k) {
+      const LspRay& of = rays[found[k].ray];
+      hits[found[k].ray] = Text::lsp_finish(scene, Text::lsp_setup(scene, of), of, found[k].best);
+    }
+    found_count = 0;
+  }
+
+  template <typename T, class Indices>
+  static HWY_INLINE void move(const T* from, T* to, size_t i, size_t at, Indices indices) {
+    store(hn::TableLookupLanes(load(from + i), indices), to + at);
+  }
+
+  // Lanes that are set, one after the other.
+  static HWY_INLINE VI lane_order(Bits bits) {
+    if constexpr (kLanes > 8) return hn::Compress(hn::Iota(di, 0), as_int(mask_of(bits)));
+    const hn::Rebind<uint8_t, DI> bytes;
+    return hn::PromoteTo(di, hn::LoadU(bytes, reinterpret_cast<const uint8_t*>(&kLaneOrders.of[bits & 255])));
+  }
+
+  // The rays that go on, to the cells they go to, in the first lanes.
+  void compact() {
+    size_t at = 0;
+    for (size_t i = 0; i < n; i += kLanes) {
+      const Bits on = lanes_of(~over, i) & ((n - i < kLanes ? Bits{1} << (n - i) : Bits{1} << kLanes) - 1);
+      const VI order = lane_order(on);
+      const auto of_f = hn::IndicesFromVec(df, order);
+      const auto of_i = hn::IndicesFromVec(di, order);
+      const auto of_u = hn::IndicesFromVec(du, order);
+      for (size_t k = 0; k < 3; ++k) {
+        move(origin_[k], origin_[k], i, at, of_f);
+        move(direction_[k], direction_[k], i, at, of_f);
+        move(inverse_[k], inverse_[k], i, at, of_f);
+        move(next_cell[k], cell_[k], i, at, of_i);
+      }
+      move(tmin_, tmin_, i, at, of_f);
+      move(tmax_, tmax_, i, at, of_f);
+      move(t_last_, t_last_, i, at, of_f);
+      move(t_out, t_, i, at, of_f);
+      move(axis_out, axis_, i, at, of_i);
+      move(ray_, ray_, i, at, of_u);
+      store(hn::Add(hn::TableLookupLanes(load(step_ + i), of_u), set_u(1)), step_ + at);
+      at += static_cast<size_t>(std::popcount(on));
+    }
+    n = at;
+  }
+
+  void run() {
+    for (;;) {
+      filled = unknown = over = exact = split = meets = 0;
+      const size_t old = n;
+      for (size_t i = 0; i < old; i += kLanes) advance<false>(i, old);
+      begin_rays();
+      for (size_t i = old; i < n; i += kLanes) advance<true>(i, n);
+      if (n == 0 && found_count == 0) return;
+      for (size_t i = 0; i < n; i += kLanes)
+        if (lanes_of(filled, i) != 0) classify(i);
+      finish();
+      for (size_t i = 0; i < n; i += kLanes)
+        if (lanes_of(split, i) != 0) choose(i);
+      if (exact != 0) trace_exactly();
+      for (size_t i = 0; i < n; i += kLanes)
+        if (lanes_of(meets, i) != 0) meet(i);
+      compact();
+    }
+  }
+};
+
+void trace(const lsp_scene& scene, bool any_hit, uint32_t dial, const LspRay* rays, LspHit* hits,
+           uint64_t count) {
+  constexpr uint64_t kAtOnce = 1u << 30;  // numbers of rays have 32 bits
+  for (uint64_t first = 0; first < count; first += kAtOnce) {
+    const uint64_t rest = count - first;
+    Tracer tracer(scene, any_hit, dial, rays + first, hits + first,
+                  static_cast<uint32_t>(rest < kAtOnce ? rest : kAtOnce));
+    static_assert(sizeof tracer <= 20 * 1024);  // of the stack, as lsp/lsp.h says
+    tracer.run();
+  }
+}
+
+}  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace lsp
+HWY_AFTER_NAMESPACE();
+#endif
+
+#if HWY_ONCE
+namespace lsp {
+namespace {
+
+#if HWY_TARGETS & HWY_AVX3
+bool has_avx3() {
+  return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
+         __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw") &&
+         __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi2") && __builtin_cpu_supports("fma");
+}
+#endif
+#if HWY_TARGETS & HWY_AVX2
+bool has_avx2() {
+  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2") &&
+         __builtin_cpu_supports("fma");
+}
+#endif
+#if HWY_TARGETS & HWY_SSE4
+bool has_sse4() { return __builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("popcnt"); }
+#endif
+#if HWY_TARGETS & HWY_NEON
+bool has_neon() { return true; }
+#endif
+
+}  // namespace
+
+const WideCells kWideCells[] = {
+#if HWY_TARGETS & HWY_AVX3
+    {"AVX-512", has_avx3, N_AVX3::trace},
+#endif
+#if HWY_TARGETS & HWY_AVX2
+    {"AVX2", has_avx2, N_AVX2::trace},
+#endif
+#if HWY_TARGETS & HWY_SSE4
+    {"SSE4", has_sse4, N_SSE4::trace},
+#endif
+#if HWY_TARGETS & HWY_NEON
+    {"NEON", has_neon, N_NEON::trace},
+#endif
+    {nullptr, nullptr, nullptr}};
+
+const WideCells* wide_cells(const lsp_scene& scene) {
+  const LspHeader& header = *scene.header;
+  // Indices of words are signed in a gather.
+  constexpr uint32_t kReach = 1u << 30;
+  if (header.entry_word_count >= kReach || header.split_count >= kReach) return nullptr;
+  for (const WideCells* wide = kWideCells; wide->name != nullptr; ++wide)
+    if (wide->runs_here()) return wide;
+  return nullptr;
+}
+
+}  // namespace lsp
+#endif

@@ -1,0 +1,239 @@
+// Rays of cells across vector lanes have the bits of rays one after the other, in every instruction set that
+// runs here.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <random>
+#include <set>
+
+#include "../baker/shapes.h"
+#include "bake.h"
+#include "lsp/lsp.h"
+#include "rays.h"
+#include "surface_rays.h"
+#include "trace_cells_wide.h"
+
+namespace lsp::test {
+namespace {
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+lsp::Baked bake_cells(const Mesh& mesh, uint32_t cells) {
+  BakeOptions options;
+  options.base = Base::kCells;
+  options.cells = cells;
+  return bake(mesh, options);
+}
+
+void move(Mesh& mesh, float scale, const glm::vec3& by) {
+  for (glm::vec3& p : mesh.positions) p = p * scale + by;
+}
+
+struct Scene {
+  const char* name;
+  lsp::Baked baked;
+};
+
+const std::vector<Scene>& scenes() {
+  static const std::vector<Scene> all = [] {
+    std::vector<Scene> made;
+    made.push_back({"ball", bake_cells(sphere(12), 6)});
+    made.push_back({"soup", bake_cells(soup(400, 0.5f), 5)});
+    Mesh far = sphere(8);
+    move(far, 1e-3f, {7, -3, 5});
+    made.push_back({"small, from afar", bake_cells(far, 4)});
+    Mesh flat;
+    add_triangle(flat, {0, 0, 0}, {1, 0, 0}, {0, 1, 0});
+    made.push_back({"a triangle", bake_cells(flat, 3)});
+    // Planes of a size apart: large empty spaces, which rays jump over.
+    Mesh apart = sphere(6);
+    add_triangle(apart, {40, -20, -20}, {40, 20, -20}, {40, 0, 30});
+    made.push_back({"far apart", bake_cells(apart, 24)});
+    return made;
+  }();
+  return all;
+}
+
+// Numbers of every size and sign, the ends of the range among them.
+class Numbers {
+ public:
+  explicit Numbers(uint64_t seed) : random_(seed) {}
+
+  uint32_t below(uint32_t n) { return static_cast<uint32_t>(random_() % n); }
+  float between(float lo, float hi) {
+    return lo + (hi - lo) * static_cast<float>(random_() >> 40) * 0x1p-24f;
+  }
+  float any() {
+    constexpr float kSpecial[] = {0.0f,      -0.0f,      1e-45f, -1e-40f,
+                                  1e-38f,    3e38f,      -3e38f, 1e20f,
+                                  -1e20f,    1.0f,       -1.0f,  1e-20f,
+                                  kInfinity, -kInfinity, 1e-30f, 16777216,
+                                  2e9f,      -5e9f,      1e30f,  std::numeric_limits<float>::quiet_NaN()};
+    return kSpecial[below(std::size(kSpecial))];
+  }
+
+ private:
+  std::mt19937_64 random_;
+};
+
+// Rays on the borders of cells and along them, short ones, of every length, from far away, and what is no ray
+// at all.
+std::vector<LspRay> grid_rays(const LspCellGrid& grid, size_t count) {
+  Numbers numbers(7);
+  std::vector<LspRay> rays(count);
+  const float extent = grid.size * static_cast<float>(grid.cells_x + grid.cells_y + grid.cells_z);
+  const uint32_t cells[3] = {grid.cells_x, grid.cells_y, grid.cells_z};
+  const float lo[3] = {grid.lo.x, grid.lo.y, grid.lo.z};
+  for (LspRay& ray : rays) {
+    float o[3], d[3];
+    const uint32_t kind = numbers.below(8);
+    for (int k = 0; k < 3; ++k) {
+      const auto border = static_cast<float>(numbers.below(4 * cells[k] + 5)) * 0.25f - 0.5f;
+      o[k] = numbers.below(3) == 0
+                 ? lo[k] + grid.size * numbers.between(-0.5f, static_cast<float>(cells[k]) + 0.5f)
+                 : lo[k] + grid.size * border;
+      d[k] = numbers.below(3) == 0 ? static_cast<float>(numbers.below(3)) - 1.0f : numbers.between(-1, 1);
+      if (kind == 0 && numbers.below(2) == 0) d[k] = numbers.any();
+      if (kind == 1 && numbers.below(3) == 0) o[k] = numbers.any();
+      if (kind == 2) o[k] += numbers.between(-1, 1) * std::ldexp(extent, static_cast<int>(numbers.below(90)));
+      if (kind == 3) d[k] = std::ldexp(d[k], static_cast<int>(numbers.below(200)) - 100);
+    }
+    ray = {{o[0], o[1], o[2]}, 0, {d[0], d[1], d[2]}, kInfinity};
+    if (kind == 4) ray.tmax = grid.size * numbers.between(0, 3);
+    if (kind == 5) ray.tmin = grid.size * numbers.between(-2, 4);
+    if (kind == 6) ray.tmin = numbers.any(), ray.tmax = numbers.any();
+    if (kind == 7) ray.tmin = ray.tmax = grid.size * static_cast<float>(numbers.below(3));
+  }
+  return rays;
+}
+
+std::vector<LspRay> rays_of(const lsp::Baked& baked) {
+  std::vector<LspRay> rays = surface_rays(baked, 3000, 1);
+  const std::vector<LspRay> hard = hard_rays(baked.triangles, 3000, 5);
+  rays.insert(rays.end(), hard.begin(), hard.end());
+  const std::vector<LspRay> grid = grid_rays(baked.header.cells, 9000);
+  rays.insert(rays.end(), grid.begin(), grid.end());
+  std::shuffle(rays.begin(), rays.end(), std::mt19937(3));
+  return rays;
+}
+
+// A counted trace is that of single rays.
+std::vector<LspHit> single_rays(const lsp_scene& scene, const lsp_trace_options& options,
+                                const std::vector<LspRay>& rays) {
+  std::vector<LspHit> hits(rays.size());
+  lsp_trace_counts counts{};
+  EXPECT_EQ(lsp_trace(&scene, &options, rays.data(), hits.data(), rays.size(), &counts, nullptr), LSP_OK);
+  return hits;
+}
+
+void expect_same(const std::vector<LspHit>& single, const std::vector<LspHit>& wide,
+                 const std::vector<LspRay>& rays, const std::string& where) {
+  size_t different = 0;
+  for (size_t i = 0; i < single.size(); ++i) {
+    if (std::memcmp(&single[i], &wide[i], sizeof(LspHit)) == 0 || ++different > 3) continue;
+    const LspRay& r = rays[i];
+    ADD_FAILURE() << where << ", ray " << i << " of " << single.size() << ": t " << single[i].t << " and "
+                  << wide[i].t << ", triangle " << single[i].primitive << " and " << wide[i].primitive
+                  << ", flags " << single[i].flags << " and " << wide[i].flags << "; origin " << r.origin.x
+                  << " " << r.origin.y << " " << r.origin.z << ", direction " << r.direction.x << " "
+                  << r.direction.y << " " << r.direction.z << ", from " << r.tmin << " to " << r.tmax;
+  }
+  EXPECT_EQ(different, 0u) << where;
+}
+
+// By the number of an instruction set.
+class WideCellsTest : public testing::TestWithParam<size_t> {
+ protected:
+  const WideCells& wide_ = kWideCells[GetParam()];
+  void SetUp() override {
+    if (!wide_.runs_here()) GTEST_SKIP() << "this CPU does not have " << wide_.name;
+  }
+};
+
+TEST_P(WideCellsTest, SameBitsAsSingleRays) {
+  for (const Scene& of : scenes()) {
+    const lsp_scene scene = view(of.baked);
+    const std::vector<LspRay> rays = rays_of(of.baked);
+    std::vector<LspHit> wide(rays.size());
+    for (const float max_loss : {100.0f, 20.0f, 5.0f, 1.0f, 0.0f})
+      for (const uint32_t any : {0u, LSP_TRACE_ANY_HIT}) {
+        const lsp_trace_options options{LSP_TRACE_APPROXIMATE | LSP_TRACE_MAX_LOSS | any, 0, 0, max_loss};
+        const auto single = single_rays(scene, options, rays);
+        wide_.trace(scene, any != 0, lsp_dial(&scene, &options), rays.data(), wide.data(), rays.size());
+        expect_same(single, wide, rays, std::string(of.name) + ", loss " + std::to_string(max_loss));
+      }
+  }
+}
+
+TEST_P(WideCellsTest, AnyNumberOfRays) {
+  const lsp_scene scene = view(scenes()[0].baked);
+  const std::vector<LspRay> rays = rays_of(scenes()[0].baked);
+  const lsp_trace_options options{LSP_TRACE_APPROXIMATE, 0};
+  const auto single = single_rays(scene, options, rays);
+  for (const size_t count : {0, 1, 2, 3, 5, 8, 15, 17, 63, 64, 65, 129, 1000}) {
+    const LspHit untouched{1, 2, 3, 4, {5, 6, 7}, 8};
+    std::vector<LspHit> wide(count + 1, untouched);
+    wide_.trace(scene, false, lsp_dial(&scene, &options), rays.data() + 100, wide.data(), count);
+    EXPECT_EQ(std::memcmp(wide.data(), single.data() + 100, count * sizeof(LspHit)), 0) << count;
+    EXPECT_EQ(std::memcmp(&wide[count], &untouched, sizeof(LspHit)), 0) << count;
+  }
+}
+
+// Tables that say anything at all, and counts that are too small: what is beyond the end is zero.
+TEST_P(WideCellsTest, SameBitsOfDamagedFiles) {
+  lsp::Baked baked = bake_cells(sphere(12), 6);
+  const std::vector<LspRay> rays = rays_of(baked);
+  std::mt19937 random(11);
+  const auto damage = [&](auto& elements) {
+    auto* bytes = reinterpret_cast<uint8_t*>(elements.data());
+    const size_t size = elements.size() * sizeof elements[0];
+    for (size_t k = 0; k < size / 64 + 1; ++k) bytes[random() % size] = static_cast<uint8_t>(random());
+  };
+  for (int round = 0; round < 12; ++round) {
+    switch (round % 6) {
+      case 0:
+        damage(baked.cell_tables.entries);
+        break;
+      case 1:
+        damage(baked.cell_tables.splits);
+        break;
+      case 2:
+        damage(baked.cell_tables.planes);
+        break;
+      case 3:
+        damage(baked.cell_tables.plane_records);
+        break;
+      case 4:
+        damage(baked.cell_tables.cells);
+        break;
+      default:
+        damage(baked.cell_grid.words);
+        break;
+    }
+    const lsp_scene scene = view(baked);
+    std::vector<LspHit> wide(rays.size());
+    for (const float max_loss : {100.0f, 2.0f}) {
+      const lsp_trace_options options{LSP_TRACE_APPROXIMATE | LSP_TRACE_MAX_LOSS, 0, 0, max_loss};
+      const auto single = single_rays(scene, options, rays);
+      wide_.trace(scene, false, lsp_dial(&scene, &options), rays.data(), wide.data(), rays.size());
+      expect_same(single, wide, rays, "damaged " + std::to_string(round));
+    }
+  }
+}
+
+size_t compiled() {
+  size_t count = 0;
+  while (kWideCells[count].name != nullptr) ++count;
+  return count;
+}
+INSTANTIATE_TEST_SUITE_P(Sets, WideCellsTest, testing::Range(size_t{0}, compiled()), [](const auto& of) {
+  std::string name = kWideCells[of.param].name;
+  std::erase(name, '-');
+  return name;
+});
+
+}  // namespace
+}  // namespace lsp::test
