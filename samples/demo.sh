@@ -58,9 +58,14 @@ validated=$(date +%s.%N)
 seconds=$(awk "BEGIN { printf \"%.3f\", $validated - $started }")
 echo "valid, $seconds s"
 
-render() { # render NAME MODE BACKEND
-  "$bin/lsp-render" "$out/scene.lsp" -o "$out/$1.png" -o "$out/$1.pfm" --mode "$2" --backend "$3" \
-    --size 576x324 --samples 4 --denoise "${view[@]}" --json >"$out/$1.json"
+render() { # render NAME MODE BACKEND [OPTION...]
+  local name=$1 mode=$2 device=$3
+  shift 3
+  "$bin/lsp-render" "$out/scene.lsp" -o "$out/$name.png" -o "$out/$name.pfm" --mode "$mode" --backend "$device" \
+    --size 576x324 --samples 4 --denoise "${view[@]}" "$@" --json >"$out/$name.json"
+}
+compare() { # compare NAME PICTURE REPORT: with exact.pfm
+  "$bin/lsp-compare" "$out/exact.pfm" "$out/$1.pfm" -o "$out/$2.png" --factor 4 --json >"$out/$3.json"
 }
 
 say "rendering indirect light, exact and approximate"
@@ -71,7 +76,11 @@ if ! render exact exact vulkan; then
   render exact exact cpu
 fi
 render approx approximate "$backend"
-"$bin/lsp-compare" "$out/exact.pfm" "$out/approx.pfm" -o "$out/difference.png" --factor 4 --json >"$out/compare.json"
+compare approx difference compare
+for quality in fast accurate; do
+  render "$quality" approximate "$backend" --quality "$quality"
+  compare "$quality" "difference_$quality" "compare_$quality"
+done
 
 say "result"
 "$bin/lsp-demo-report" "$out" -o "$out/report.html" --title "$title" --validate-seconds "$seconds"

@@ -96,7 +96,11 @@ int main(int argc, char** argv) {
   app.option_defaults()->always_capture_default();
   app.add_option("INPUT", a.inputs, "Mesh files, read in this order")->required();
   app.add_option("-o,--output", a.output, "The .lsp file to write")->required();
-  app.add_option("--base", a.base, "Base structure")->check(CLI::IsMember({"bvh", "ntree", "cells"}));
+  app.add_option(
+         "--base", a.base,
+         "Base structure: cells, answered from tables and traced exactly where these lose; or a tree with "
+         "Line Spaces, bvh or ntree. Where it is left out: cells, but bvh with an option of Line Spaces")
+      ->check(CLI::IsMember({"cells", "bvh", "ntree"}));
   app.add_option("--cells", a.cells,
                  "Cells along the longest side of the grid of --base cells; 0: chosen from the scene")
       ->check(CLI::Range(0u, LSP_MAX_CELLS));

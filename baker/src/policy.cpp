@@ -26,6 +26,19 @@ constexpr uint64_t kErrorRays = 65536;
 const std::map<std::string, Base> kBases = {
     {"bvh", Base::kBvh}, {"ntree", Base::kNTree}, {"cells", Base::kCells}};
 
+// What only Line Spaces have.
+bool asks_for_line_spaces(const Arguments& a) {
+  return a.resolution_given || a.depth_given || a.samples_given || a.triangles != 0 || a.no_line_spaces ||
+         a.conservative || a.directed || a.purpose == Purpose::kVisibility || a.normal_angle != 180 ||
+         a.plane_tolerance != 0;
+}
+
+std::string base_of(const Arguments& a) {
+  if (!a.base.empty()) return a.base;
+  if (a.cells != 0) return "cells";
+  return asks_for_line_spaces(a) ? "bvh" : "cells";
+}
+
 // Throws where options contradict each other.
 void check(const Arguments& a) {
   if (a.exact && a.no_exact) throw Failure(Exit::kUsage, "", "--exact and --no-exact exclude each other");
@@ -41,14 +54,13 @@ void check(const Arguments& a) {
     throw Failure(Exit::kUsage, "", "--branching and --levels need --base ntree");
   const bool cells = a.base == "cells";
   if (a.cells && !cells) throw Failure(Exit::kUsage, "", "--cells needs --base cells");
-  if (cells && (a.resolution_given || a.depth_given || a.samples_given || a.no_line_spaces))
+  if (cells && asks_for_line_spaces(a))
     throw Failure(Exit::kUsage, "",
-                  "--base cells has its own tables: leave out --resolution, --depth, --samples and "
-                  "--no-line-spaces");
-  if (cells && a.purpose == Purpose::kVisibility)
-    throw Failure(Exit::kUsage, "", "--for visibility needs Line Spaces: leave out --base cells");
+                  "cells have tables of their own: leave out --base cells and --cells, or what is of Line "
+                  "Spaces: --resolution, --depth, --samples, --triangles, --no-line-spaces, --normal-angle, "
+                  "--plane-tolerance, --for visibility");
   if (ntree && a.max_error > 0)
-    throw Failure(Exit::kUsage, "", "--max-error chooses among BVHs, leave out --base");
+    throw Failure(Exit::kUsage, "", "--max-error chooses among cells or BVHs: leave out --base ntree");
   if (a.no_line_spaces && a.no_exact)
     throw Failure(Exit::kUsage, "", "--no-line-spaces with --no-exact leaves nothing to trace");
 }
@@ -126,6 +138,7 @@ void leave_out_exact(Baked& baked, bool cells) {
 }  // namespace
 
 void settle(Arguments& a) {
+  a.base = base_of(a);
   check(a);
   const Preset& preset = kPresets.at(a.preset);
   const bool ntree = a.base == "ntree";

@@ -33,6 +33,15 @@ uint64_t partial_records(const Baked& baked) {
   return uint64_t(std::count_if(baked.triangles.begin(), baked.triangles.end(), has_gaps));
 }
 
+// Null without cells.
+Json cells_json(const LspHeader& h) {
+  if (h.cells.cells_x == 0) return nullptr;
+  return {{"grid", {h.cells.cells_x, h.cells.cells_y, h.cells.cells_z}},
+          {"filled", h.filled_cell_count},
+          {"planes", h.plane_count},
+          {"splits", h.split_count}};
+}
+
 }  // namespace
 
 Json report_json(const BakeReport& done, const Json& meta) {
@@ -55,6 +64,7 @@ Json report_json(const BakeReport& done, const Json& meta) {
           {"shafts", ls.shafts},
           {"filled_shafts", ls.filled},
           {"dense_line_spaces", ls.dense},
+          {"cells", cells_json(baked.header)},
           {"seconds",
            {{"import", done.import_seconds},
             {"base_structure", baked.tree_seconds},

@@ -1,6 +1,7 @@
 // lsp-demo-report: one self-contained HTML page about a bake and two renderings of it, for samples/demo.sh.
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -40,19 +41,28 @@ int main(int argc, char** argv) {
   std::string title = "scene";
   double validate_seconds = 0;
   add_common_options(app, kProgram, common);
-  app.add_option("FOLDER", folder, "With bake.json, exact.json, approx.json, compare.json and the pictures")
+  app.add_option(
+         "FOLDER", folder,
+         "With bake.json, exact.json, approx.json, compare.json and the pictures; of the other qualities "
+         "fast.json, compare_fast.json, accurate.json, compare_accurate.json where they are there")
       ->required();
   app.add_option("-o,--output", output, "The page")->required();
   app.add_option("--title", title, "What was baked");
   app.add_option("--validate-seconds", validate_seconds, "Time of lsp-validate");
   return run_program(kProgram, app, argc, argv, [&] {
     try {
-      const Figures figures{title,
-                            validate_seconds,
-                            read_json(folder + "/bake.json"),
-                            read_json(folder + "/exact.json"),
-                            read_json(folder + "/approx.json"),
-                            read_json(folder + "/compare.json")};
+      Figures figures{title,
+                      validate_seconds,
+                      read_json(folder + "/bake.json"),
+                      read_json(folder + "/exact.json"),
+                      read_json(folder + "/approx.json"),
+                      read_json(folder + "/compare.json"),
+                      {}};
+      for (const std::string name : {"fast", "accurate"}) {
+        if (!std::filesystem::exists(folder + "/" + name + ".json")) continue;
+        figures.others.push_back({name, read_json(folder + "/" + name + ".json"),
+                                  read_json(folder + "/compare_" + name + ".json")});
+      }
       const Pictures pictures{read_file(folder + "/exact.png"), read_file(folder + "/approx.png"),
                               read_file(folder + "/difference.png")};
       write_file(output, make_page(figures, pictures));

@@ -31,10 +31,15 @@ std::string psnr(const nlohmann::json& compare) {
   return compare.at("psnr_db").is_null() ? "equal pictures" : format("%.1f dB", number(compare, "psnr_db"));
 }
 
-double speed_up(const Figures& f) {
+double speed_up(const Figures& f, const nlohmann::json& approximate) {
   const double exact = number(f.exact, "indirect_mrays_per_second");
-  return exact > 0 ? number(f.approximate, "indirect_mrays_per_second") / exact : 0;
+  return exact > 0 ? number(approximate, "indirect_mrays_per_second") / exact : 0;
 }
+
+bool has_cells(const Figures& f) { return f.bake.contains("cells") && !f.bake.at("cells").is_null(); }
+
+// What the tables are called.
+const char* tables_of(const Figures& f) { return has_cells(f) ? "tables of cells" : "Line Spaces"; }
 
 // A row of the table: a name and the two pictures' values.
 std::string row(const char* name, const std::string& exact, const std::string& approximate) {
@@ -49,6 +54,26 @@ std::string list(const nlohmann::json& items) {
   std::string out;
   for (const auto& item : items) out += "<li>" + escape_html(item.get<std::string>()) + "</li>\n";
   return out.empty() ? "<li>nothing</li>\n" : out;
+}
+
+// The qualities side by side; nothing where there is but one.
+std::string dial(const Figures& f) {
+  if (f.others.empty()) return "";
+  std::string html =
+      "<h2>The dial</h2>\n<p>The same file at other qualities: where tables lose more than the quality "
+      "allows, a cell "
+      "is traced exactly. fast is tables alone.</p>\n<table><thead><tr><th>quality</th><th>rays a second, "
+      "times "
+      "exact</th><th>mean error</th><th>pixels that differ visibly</th></tr></thead>\n";
+  const auto add = [&](const std::string& name, const nlohmann::json& approximate,
+                       const nlohmann::json& compare) {
+    html += "<tr><th>" + escape_html(name) +
+            format("</th><td>%.2f</td><td>%.2f %%</td><td>%.2f %%</td></tr>\n", speed_up(f, approximate),
+                   100 * number(compare, "relative_mean"), 100 * number(compare, "pixels_over_5_percent"));
+  };
+  add("balanced (shown)", f.approximate, f.compare);
+  for (const Figures::Quality& other : f.others) add(other.name, other.approximate, other.compare);
+  return html + "</table>\n";
 }
 
 constexpr const char* kStyle = R"(
@@ -128,15 +153,16 @@ std::string make_page(const Figures& f, const Pictures& pictures) {
   std::string html =
       "<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n<title>lsp: " +
-      title + "</title>\n<style>" + kStyle +
-      "</style>\n<main>\n<h1>Indirect light from Line Spaces: " + title + "</h1>\n";
+      title + "</title>\n<style>" + kStyle + "</style>\n<main>\n<h1>Indirect light from " + tables_of(f) +
+      ": " + title + "</h1>\n";
   html +=
       "<p>The same picture twice, with the same random numbers. What the eye sees and direct light are "
       "traced exactly "
       "in both; indirect light (what arrives over another surface, or as a reflection, and the shadow rays "
-      "there) is traced exactly in one and "
-      "looked up in Line Spaces in the other: <strong>" +
-      format("%.2f times the rays a second", speed_up(f)) + "</strong>, " + psnr(f.compare) + " apart.</p>\n";
+      "there) is traced exactly in one and looked up in " +
+      std::string(tables_of(f)) + " in the other: <strong>" +
+      format("%.2f times the rays a second", speed_up(f, f.approximate)) + "</strong>, " + psnr(f.compare) +
+      " apart.</p>\n";
   html +=
       "<div class=\"slide\"><img alt=\"exact\" src=\"" + exact +
       "\"><img class=\"over\" alt=\"approximate\" src=\"" + approximate +
@@ -177,12 +203,20 @@ std::string make_page(const Figures& f, const Pictures& pictures) {
                                               : "not denoised") +
           ". A pixel differs visibly where a displayed channel is off by more than 5 %.</p>\n";
 
-  html += "<h2>The bake</h2>\n<dl>\n";
+  html += dial(f) + "<h2>The bake</h2>\n<dl>\n";
   html += fact("triangles read", format("%.0f", number(triangles, "read")));
   html += fact("triangles kept", format("%.0f", number(triangles, "kept")));
-  html += fact("Line Spaces", format("%.0f", number(f.bake, "line_spaces")));
-  html += fact("shafts filled", format("%.0f %%", 100 * number(f.bake, "filled_shafts") /
-                                                      std::max(number(f.bake, "shafts"), 1.0)));
+  if (has_cells(f)) {
+    const nlohmann::json& cells = f.bake.at("cells");
+    const nlohmann::json& grid = cells.at("grid");
+    html += fact("cells",
+                 format("%d x %d x %d", grid.at(0).get<int>(), grid.at(1).get<int>(), grid.at(2).get<int>()));
+    html += fact("of them filled", format("%.0f", number(cells, "filled")));
+  } else {
+    html += fact("Line Spaces", format("%.0f", number(f.bake, "line_spaces")));
+    html += fact("shafts filled", format("%.0f %%", 100 * number(f.bake, "filled_shafts") /
+                                                        std::max(number(f.bake, "shafts"), 1.0)));
+  }
   html += fact("file", megabytes(number(f.bake, "file_bytes")));
   html += fact("time to bake", format("%.2f s", total_seconds(seconds)));
   html += fact("peak memory", megabytes(number(f.bake, "peak_memory_bytes")));
@@ -205,9 +239,11 @@ std::string make_page(const Figures& f, const Pictures& pictures) {
 
 std::string make_summary(const Figures& f) {
   std::string text;
-  text += format("bake:        %.0f triangles, %.0f Line Spaces, %s, %.2f s\n",
-                 number(f.bake.at("triangles"), "kept"), number(f.bake, "line_spaces"),
-                 megabytes(number(f.bake, "file_bytes")).c_str(), total_seconds(f.bake.at("seconds")));
+  const std::string tables = has_cells(f) ? format("%.0f filled cells", number(f.bake.at("cells"), "filled"))
+                                          : format("%.0f Line Spaces", number(f.bake, "line_spaces"));
+  text += format("bake:        %.0f triangles, %s, %s, %.2f s\n", number(f.bake.at("triangles"), "kept"),
+                 tables.c_str(), megabytes(number(f.bake, "file_bytes")).c_str(),
+                 total_seconds(f.bake.at("seconds")));
   for (const auto& item : f.bake.at("skipped")) text += "skipped:     " + item.get<std::string>() + "\n";
   text += format("validate:    %.2f s\n", f.validate_seconds);
   text += "device:      " + f.exact.at("device").get<std::string>() + " (" +
@@ -222,8 +258,11 @@ std::string make_summary(const Figures& f) {
   line("approximate:", f.approximate);
   text += format(
       "difference:  %.2f times the rays a second; PSNR %s, mean error %.2f %%, %.2f %% of pixels visibly\n",
-      speed_up(f), psnr(f.compare).c_str(), 100 * number(f.compare, "relative_mean"),
+      speed_up(f, f.approximate), psnr(f.compare).c_str(), 100 * number(f.compare, "relative_mean"),
       100 * number(f.compare, "pixels_over_5_percent"));
+  for (const Figures::Quality& other : f.others)
+    text += format("%-12s %.2f times the rays a second; mean error %.2f %%\n", (other.name + ":").c_str(),
+                   speed_up(f, other.approximate), 100 * number(other.compare, "relative_mean"));
   return text;
 }
 

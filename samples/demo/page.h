@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace lsp::sample {
 
@@ -16,6 +17,13 @@ struct Figures {
   nlohmann::json exact;
   nlohmann::json approximate;
   nlohmann::json compare;
+  // Of cells: the same picture at the other qualities, what lsp-render and lsp-compare printed.
+  struct Quality {
+    std::string name;
+    nlohmann::json approximate;
+    nlohmann::json compare;
+  };
+  std::vector<Quality> others;
 };
 
 // PNG files' bytes.

@@ -38,7 +38,7 @@ Figures example() {
                                   {"rmse", 0.0},
                                   {"relative_mean", 0.0},
                                   {"pixels_over_5_percent", 0.0}};
-  return {"a <scene>", 0.125, bake, render, approximate, compare};
+  return {"a <scene>", 0.125, bake, render, approximate, compare, {}};
 }
 
 TEST(Page, Base64) {
@@ -73,6 +73,21 @@ TEST(Page, SaysTheFigures) {
   const std::string summary = make_summary(example());
   EXPECT_NE(summary.find("1.50 times"), std::string::npos);
   EXPECT_NE(summary.find("skipped:     empty shafts"), std::string::npos);
+}
+
+TEST(Page, TellsOfCellsAndTheirDial) {
+  Figures figures = example();
+  EXPECT_EQ(make_page(figures, {}).find("The dial"), std::string::npos);
+  figures.bake["cells"] = {{"grid", {24, 10, 15}}, {"filled", 2130}, {"planes", 1}, {"splits", 1}};
+  nlohmann::json fast = figures.approximate, compare = figures.compare;
+  fast["indirect_mrays_per_second"] = 9.0;
+  compare["relative_mean"] = 0.0625;
+  figures.others.push_back({"fast", fast, compare});
+  const std::string page = make_page(figures, {});
+  for (const char* part : {"24 x 10 x 15", "2130", "The dial", "4.50", "6.25 %"})
+    EXPECT_NE(page.find(part), std::string::npos) << part;
+  EXPECT_EQ(page.find("Line Spaces"), std::string::npos);
+  EXPECT_NE(make_summary(figures).find("fast:        4.50 times"), std::string::npos);
 }
 
 TEST(Page, MissingFigureIsReported) {
