@@ -21,9 +21,9 @@ done
 
 started=$SECONDS
 # What only the tests need: Debian packages are made, with manual pages; a project is built with Make; shaders become
-# HLSL and Metal's language. And where nothing of the kind is there: the second reader runs on Node.js, the fuzzers are
+# HLSL and Metal's language; sources are formatted. And where nothing of the kind is there: the second reader runs on Node.js, the fuzzers are
 # built with Clang.
-extra=(dpkg-dev file help2man make spirv-cross)
+extra=(clang-format-14 dpkg-dev file help2man make spirv-cross)
 command -v npm >/dev/null || extra+=(nodejs npm)
 command -v clang++-14 >/dev/null || extra+=(clang-14)
 compgen -G '/usr/lib/llvm-14/lib/clang/*/lib/linux/libclang_rt.fuzzer-*.a' >/dev/null || extra+=(libclang-rt-14-dev)
@@ -66,6 +66,8 @@ run_preset release --
 if [ "$with_asan" = 1 ]; then
   # Everything that reads untrusted bytes, once more under the address and undefined-behaviour sanitizers.
   run_preset asan parser_tests -- -L parser
+  # What is called from many threads, once more under the thread sanitizer.
+  run_preset tsan thread_tests -- -L threads
 fi
 
 echo

@@ -27,14 +27,15 @@ inline bool has_gaps(const LspTriangle& t) { return t.flags >> LSP_TRIANGLE_GAPS
 
 struct LineSpaceOptions {
   LineSpaceKind kind = LineSpaceKind::kCandidates;
-  bool directed = false;      // binary: a bit for either direction of a shaft
-  bool conservative = false;  // binary: a clear bit proves the shaft empty (conservative.h)
+  bool directed = false;               // binary: a bit for either direction of a shaft
+  bool conservative = false;           // binary: a clear bit proves the shaft empty (conservative.h)
   uint32_t resolution = 6;             // N: patches along an edge of the box, 1 to LSP_MAX_RESOLUTION
   std::vector<uint32_t> depths = {9};  // D: inner nodes at these depths carry a Line Space (the root is at 0)
   // Rays per shaft that choose its candidate: 1 is the paper's centroid ray, more pick the triangle (or none)
   // whose plane answers all of them best.
   uint32_t samples = 5;
-  // Rays can be traced exactly through a node that a Line Space stands for: keep_approximate_only is not asked for.
+  // Rays can be traced exactly through a node that a Line Space stands for: keep_approximate_only is not
+  // asked for.
   bool exact = true;
   // Not empty: words and candidates lie in temporary files in this folder.
   std::filesystem::path folder;
@@ -69,10 +70,10 @@ struct LineSpaces {
   uint64_t dropped = 0;  // sites whose Line Space had no filled shaft
 };
 
-// Computes the Line Space of every site on all threads of the current oneTBB arena, from the triangles of `bvh`,
-// whose records are `triangles`. `references` becomes, per site, its Line Space reference, LSP_NONE when no
-// shaft was filled. The result does not depend on the number of threads. `progress` is called with the share
-// done, from any thread.
+// Computes the Line Space of every site on all threads of the current oneTBB arena, from the triangles of
+// `bvh`, whose records are `triangles`. `references` becomes, per site, its Line Space reference, LSP_NONE
+// when no shaft was filled. The result does not depend on the number of threads. `progress` is called with
+// the share done, from any thread.
 LineSpaces fill_line_spaces(const Bvh& bvh, const LspHeader& header, std::span<const LspTriangle> triangles,
                             const std::vector<LineSpaceSite>& sites, const LineSpaceOptions& options,
                             std::vector<uint32_t>& references,

@@ -61,8 +61,9 @@ class CellCheck {
            std::to_string(filled) + " cells are filled, " + std::to_string(cells_.size()) + " have a record");
   }
 
-  // Filled cells below (x, y, z) along every axis, for all corners of cells, so that a box of any size is counted
-  // by eight look-ups (Crow, "Summed-area tables for texture mapping", 1984): a jump may be as long as the grid.
+  // Filled cells below (x, y, z) along every axis, for all corners of cells, so that a box of any size is
+  // counted by eight look-ups (Crow, "Summed-area tables for texture mapping", 1984): a jump may be as long
+  // as the grid.
   void sum_filled() {
     const uint64_t row = uint64_t{grid_.cells_x} + 1, slice = row * (uint64_t{grid_.cells_y} + 1);
     sums_.assign(slice * (uint64_t{grid_.cells_z} + 1), 0);

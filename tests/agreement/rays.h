@@ -11,6 +11,7 @@
 namespace lsp::test {
 
 // `count` rays about a scene of the given scale, every kind in turn.
-std::vector<LspRay> hard_rays(std::span<const LspTriangle> triangles, uint32_t count, uint64_t seed, float scale = 1);
+std::vector<LspRay> hard_rays(std::span<const LspTriangle> triangles, uint32_t count, uint64_t seed,
+                              float scale = 1);
 
 }  // namespace lsp::test

@@ -23,7 +23,8 @@ struct Bake {
 
 Bake line_space_bake(unsigned resolution, unsigned depth);
 
-// An NTree of `branching` cells an edge and `levels` levels of nodes, Line Spaces of that resolution at `depth`.
+// An NTree of `branching` cells an edge and `levels` levels of nodes, Line Spaces of that resolution at
+// `depth`.
 Bake ntree_bake(unsigned branching, unsigned depth, unsigned levels = 3);
 
 // What a bake cost. `available` is false where lsp-bake could not or would not.

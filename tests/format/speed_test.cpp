@@ -179,8 +179,8 @@ TEST(Speed, StructureCostsNoMoreThanFourTimesReadingAndHashing) {
   expect_fast(large_ntree(), "NTree without Line Spaces");
 }
 
-// The jumps of a large grid with one filled cell are as long as they can be: a check that looks at every cell of
-// every jump would take hours.
+// The jumps of a large grid with one filled cell are as long as they can be: a check that looks at every cell
+// of every jump would take hours.
 TEST(Speed, JumpsOfALargeGridOfCells) {
   constexpr uint32_t kN = 128;
   Image image = full_cells_scene(true);

@@ -1,5 +1,10 @@
 // Small files as people have them; what is right of each stands in the folder's INDEX.md.
+#include <unistd.h>
+
 #include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
 
 #include "mesh_files.h"
 
@@ -103,6 +108,50 @@ TEST_F(Cases, AGeoreferencedHouseKeepsAllItsTriangles) {
     EXPECT_GT(glm::length(mesh.origin), 1e5) << name;
     EXPECT_LT(glm::length(extent(mesh)), 1e3f) << name;
   }
+}
+
+TEST_F(Cases, TheLibraryOfMaterialsIsASource) {
+  const Mesh mesh = import("stale_mtl/room.obj");
+  ASSERT_EQ(mesh.sources.size(), 1u);
+  ASSERT_EQ(mesh.sources[0].size(), 2u);
+  EXPECT_EQ(mesh.sources[0][1].filename(), "room.mtl");
+  // Its bytes are in the hash: a copy of the scene with other paint has another.
+  const std::filesystem::path folder =
+      std::filesystem::temp_directory_path() / ("lsp_stale_" + std::to_string(getpid()));
+  std::filesystem::copy(std::filesystem::path(LSP_CASES_DIR) / "stale_mtl", folder);
+  const std::filesystem::path copy = folder / "room.obj";
+  EXPECT_EQ(lsp::hash_sources(lsp::import_meshes({&copy, 1}, {})), lsp::hash_sources(mesh));
+  std::ofstream(folder / "room.mtl", std::ios::app) << "Ke 1 1 1\n";
+  EXPECT_NE(lsp::hash_sources(lsp::import_meshes({&copy, 1}, {})), lsp::hash_sources(mesh));
+  std::filesystem::remove_all(folder);
+}
+
+// A face of 15,000 corners, a star of as many points, has the area of its outline.
+TEST_F(Cases, AFaceOfVeryManyCornersKeepsItsArea) {
+  constexpr int kCorners = 15000;
+  std::string obj, face = "f";
+  double shoelace = 0, before_x = 0, before_y = 0, first_x = 0, first_y = 0;
+  for (int i = 0; i < kCorners; ++i) {
+    const double angle = 6.283185307179586 * i / kCorners, r = i % 2 ? 1.0 : 1.7;
+    const double x = r * std::cos(angle), y = r * std::sin(angle);
+    char line[64];
+    std::snprintf(line, sizeof line, "v %.9f %.9f 0\n", x, y);
+    obj += line;
+    std::snprintf(line, sizeof line, " %d", i + 1);
+    face += line;
+    if (i == 0) first_x = x, first_y = y;
+    if (i > 0) shoelace += before_x * y - before_y * x;
+    before_x = x, before_y = y;
+  }
+  shoelace = 0.5 * (shoelace + before_x * first_y - before_y * first_x);
+  const std::filesystem::path path =
+      std::filesystem::temp_directory_path() / ("lsp_star_" + std::to_string(getpid()) + ".obj");
+  std::ofstream(path) << obj << face << "\n";
+  const Mesh mesh = lsp::import_meshes({&path, 1}, {});
+  std::filesystem::remove(path);
+  EXPECT_EQ(mesh.primitive_count, uint64_t{kCorners - 2});
+  EXPECT_NEAR(area(mesh), shoelace, 1e-4 * shoelace);
+  for (const std::string& note : mesh.notes) EXPECT_NE(note.find("normals stay flat"), note.npos) << note;
 }
 
 }  // namespace

@@ -140,6 +140,28 @@ TEST_F(GltfColor, WhatCannotBeReadIsNotedAndTheFactorHolds) {
   }
 }
 
+TEST_F(GltfColor, APictureInKtx2IsNamedOnce) {
+  // As exporters write it: no source but the extension's, which is required; used by two materials.
+  Square square;
+  const json texture = square.texture("\xABKTX 20\xBB\r\n\x1A\n and so on");
+  json& root = square.document.root;
+  root["images"][0]["name"] = "bark";
+  root["images"][0]["mimeType"] = "image/ktx2";
+  root["textures"][0] = {{"extensions", {{"KHR_texture_basisu", {{"source", 0}}}}}};
+  root["extensionsRequired"] = root["extensionsUsed"] = {"KHR_texture_basisu"};
+  square.base() = {{"baseColorFactor", {0.25, 0.5, 1, 1}}, {"baseColorTexture", texture}};
+  root["materials"].push_back(square.material());
+  root["materials"][1]["alphaMode"] = "MASK";
+  square.finish();
+  json second = root["meshes"][0]["primitives"][0];
+  second["material"] = 1;
+  root["meshes"][0]["primitives"].push_back(second);
+  const Mesh mesh = import(square.document);
+  EXPECT_EQ(mesh.triangles.size(), 4u);
+  ASSERT_EQ(mesh.notes.size(), 1u);
+  EXPECT_TRUE(has_note(mesh, "the picture bark is KTX2, which is not read; factors hold without it"));
+}
+
 TEST_F(GltfColor, WrapModes) {
   // Left texel white, right black; coordinates from 1 to 2 see the same, the last column, or both turned
   // round.

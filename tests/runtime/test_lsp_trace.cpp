@@ -157,7 +157,8 @@ TEST_F(LspTrace, FilesWithoutWhatIsAskedFor) {
   const Bytes exact = write_raw(build_parts(options));
   write("exact.lsp", exact.data(), exact.size());
   EXPECT_EQ(run(std::string("exact.lsp") + kFiles), 0) << err();  // exact by itself
-  EXPECT_EQ(run(std::string("exact.lsp --mode approximate") + kFiles), 0) << err();  // nothing to approximate with
+  EXPECT_EQ(run(std::string("exact.lsp --mode approximate") + kFiles), 0)
+      << err();  // nothing to approximate with
   options.line_spaces = true;
   options.exact = false;
   const Bytes approximate = write_raw(build_parts(options));

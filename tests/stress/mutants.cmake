@@ -1,9 +1,10 @@
 # Copies of the tracer's text with one fault each, made when CMake configures, compiled like the text itself.
-# A fault whose place is not found any more is an error: the suite must not lose a check unseen.
+# A fault whose place is not found any more fails a test: the suite must not lose a check unseen.
 set(mutants_dir ${CMAKE_CURRENT_BINARY_DIR}/variants)
 set(tracer_dir ${PROJECT_SOURCE_DIR}/runtime/include/lsp)
 set(variant_sources)
 set(variants_inc "")
+set(mutants_lost "")
 
 function(lsp_variant name file from to)
   set(dir ${mutants_dir}/${name})
@@ -11,7 +12,7 @@ function(lsp_variant name file from to)
     file(READ ${tracer_dir}/${file} text)
     string(REPLACE "${from}" "${to}" changed "${text}")
     if(changed STREQUAL text)
-      message(FATAL_ERROR "tests/stress/mutants.cmake: ${name}: not found in ${file}: ${from}")
+      set(mutants_lost "${mutants_lost} ${name} (${file})" PARENT_SCOPE)
     endif()
     file(CONFIGURE OUTPUT ${dir}/lsp/${file} CONTENT "${changed}" @ONLY)
     if(NOT file STREQUAL "traverse.h")

@@ -26,6 +26,10 @@ uint64_t failures(const char* name, const StressScene& scene, TraceRays trace) {
   return check_family(family(name), scene, trace, kRays, 7).failures;
 }
 
+TEST(Mutations, EveryFaultHasItsPlace) {
+  EXPECT_STREQ(LSP_MUTANTS_LOST, "") << "the text has moved: say it anew in tests/stress/mutants.cmake";
+}
+
 // The tracer's text as it is passes what the faults below fail, so that it is the fault that is found.
 TEST(Mutations, TheTextWithoutAFaultPasses) {
   for (const StressScene* scene : {&room_scene(), &away_scene()}) {

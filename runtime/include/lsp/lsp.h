@@ -44,7 +44,7 @@ typedef struct lsp_error {
   char message[192]; /* what is wrong and what to do, zero-terminated */
 } lsp_error;
 
-/* ---- files ---------------------------------------------------------------------------------------------- */
+/* ---- files ---- */
 
 /* A file mapped read-only. `bytes` is page-aligned. */
 typedef struct lsp_mapping {
@@ -60,7 +60,7 @@ LSP_API void lsp_unmap_file(lsp_mapping* mapping);
 /* Sections a file may have at most; lsp_open compares each with all others. */
 #define LSP_MAX_SECTIONS 256u
 
-/* ---- scenes --------------------------------------------------------------------------------------------- */
+/* ---- scenes ---- */
 
 /* A view of an open file: pointers into the caller's bytes, nothing owned. Arrays that the file does not
  * have, or that were not asked for, are NULL with a count of 0 in the header's sense. */
@@ -69,10 +69,11 @@ typedef struct lsp_scene {
   uint64_t size;
   const LspHeader* header;
   const LspSection* sections; /* header->section_count of them */
-  /* One pointer a section (lsp/sections.def): nodes or, of an NTree, grid, cells, references; of cells besides nodes cell_words,
-   * filled_cells, entries, planes, plane_records, splits, cell_nodes, cell_references; triangles, normals, materials;
-   * line_spaces, bit_words, candidates. */
-#define LSP_ARRAY_SECTION(Name, TYPE, code, Element, flag, base, feature, owed, member, ...) const Element* member;
+  /* One pointer a section (lsp/sections.def): nodes or, of an NTree, grid, cells, references; of cells
+   * besides nodes cell_words, filled_cells, entries, planes, plane_records, splits, cell_nodes,
+   * cell_references; triangles, normals, materials; line_spaces, bit_words, candidates. */
+#define LSP_ARRAY_SECTION(Name, TYPE, code, Element, flag, base, feature, owed, member, ...) \
+  const Element* member;
 #include "lsp/sections.def"
 } lsp_scene;
 
@@ -81,29 +82,29 @@ typedef struct lsp_scene {
  * hashes are not computed (lsp-validate does). A packed file is LSP_ERROR_UNSUPPORTED: unpack it first. */
 LSP_API lsp_status lsp_open(const void* bytes, uint64_t size, lsp_scene* scene, lsp_error* error);
 
-/* What positions in the scene, in rays and in hits are relative to, x y z in the input's space: not zero where single
- * precision would have moved vertices. */
+/* What positions in the scene, in rays and in hits are relative to, x y z in the input's space: not zero
+ * where single precision would have moved vertices. */
 LSP_API void lsp_scene_origin(const lsp_scene* scene, double origin[3]);
 
-/* Raw and packed form. header.alignment states the alignment of the raw form, in packed files too. A file with
- * any compressed section is packed: its sections start at multiples of 256 and its length is padded to 256. In
- * the raw form that lsp_unpack writes, the sections follow the table in its order, each at the next multiple of
- * header.alignment, and the length is padded to it; everything between is zero. Content hash and features are
- * the same in both, header_hash is recomputed. Packing a raw file of that layout and unpacking it gives the
- * same bytes again. */
+/* Raw and packed form. header.alignment states the alignment of the raw form, in packed files too. A file
+ * with any compressed section is packed: its sections start at multiples of 256 and its length is padded to
+ * 256. In the raw form that lsp_unpack writes, the sections follow the table in its order, each at the next
+ * multiple of header.alignment, and the length is padded to it; everything between is zero. Content hash and
+ * features are the same in both, header_hash is recomputed. Packing a raw file of that layout and unpacking
+ * it gives the same bytes again. */
 
 /* Size of the raw form of the packed or raw file in bytes[0, size), in bytes. `bytes` must be 16-byte aligned
  * and may be hostile: a size that its stored bytes cannot hold is refused, but bound what you allocate. */
 LSP_API lsp_status lsp_unpacked_size(const void* bytes, uint64_t size, uint64_t* unpacked, lsp_error* error);
 
-/* Writes the raw form of the file into `out`, 16-byte aligned, exactly lsp_unpacked_size bytes, not overlapping
- * `bytes`. Header, table and every section are checked against their hashes. After an error `out` holds nothing
- * of use. zstd allocates its working memory here; this is the only function of the library that allocates. Of a
- * library built without LSP_PACKED it is LSP_ERROR_UNSUPPORTED. */
+/* Writes the raw form of the file into `out`, 16-byte aligned, exactly lsp_unpacked_size bytes, not
+ * overlapping `bytes`. Header, table and every section are checked against their hashes. After an error `out`
+ * holds nothing of use. zstd allocates its working memory here; this is the only function of the library that
+ * allocates. Of a library built without LSP_PACKED it is LSP_ERROR_UNSUPPORTED. */
 LSP_API lsp_status lsp_unpack(const void* bytes, uint64_t size, void* out, uint64_t out_size,
                               lsp_error* error);
 
-/* ---- tracing on the CPU --------------------------------------------------------------------------------- */
+/* ---- tracing on the CPU ---- */
 
 #ifdef __cplusplus
 #define LSP_DEFAULT(value) = value
@@ -114,10 +115,11 @@ LSP_API lsp_status lsp_unpack(const void* bytes, uint64_t size, void* out, uint6
 /* All zero: exact, closest hits. A flag or a quality that the library does not know is refused. */
 typedef struct lsp_trace_options {
   uint32_t flags; /* LSP_TRACE_* */
-  float lod; /* theta: stop at a Line Space once its box's diagonal is under lod * distance; 0: deepest only */
+  float
+      lod; /* theta: stop at a Line Space once its box's diagonal is under lod * distance; 0: deepest only */
   uint32_t quality LSP_DEFAULT(0); /* of cells: LSP_QUALITY_*, 0: balanced */
-  float max_loss LSP_DEFAULT(0);   /* with LSP_TRACE_MAX_LOSS: where entries of cells lose more, in per cent, the cell is
-                       traced exactly. 100: tables alone, 0: no entry is heeded */
+  float max_loss LSP_DEFAULT(0);   /* with LSP_TRACE_MAX_LOSS: where entries of cells lose more, in per cent,
+                       the cell is   traced exactly. 100: tables alone, 0: no entry is heeded */
 } lsp_trace_options;
 #undef LSP_DEFAULT
 
@@ -129,9 +131,10 @@ typedef struct lsp_trace_counts {
   uint64_t rays;
   uint64_t invalid; /* rays with a non-finite component, a zero direction or tmin > tmax: misses */
   uint64_t hits;
-  uint64_t nodes;     /* LspNode visited (two boxes each); NTree and cells: cells stepped through, empty ones too */
-  uint64_t shafts;    /* Line Space look-ups */
-  uint64_t triangles; /* triangles tested exactly */
+  uint64_t
+      nodes; /* LspNode visited (two boxes each); NTree and cells: cells stepped through, empty ones too */
+  uint64_t shafts;      /* Line Space look-ups */
+  uint64_t triangles;   /* triangles tested exactly */
   uint64_t splits;      /* cells: look-ups that found a split */
   uint64_t exact;       /* cells: exact traces of one cell */
   uint64_t exact_nodes; /* cells: LspCellNode visited in these */

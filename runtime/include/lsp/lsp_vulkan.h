@@ -10,8 +10,8 @@
  *                                                 +-- upload: copies straight from the mapping, in pieces
  *
  * Shaders: include lsp/lsp.glsl in your own and bind the scene's buffers to bindings 0 to 6, of an NTree to 8
- * (LSP_ADDRESSES defined where a section is too large for a storage buffer); or use the ready trace shader here,
- * which reads rays from a buffer and writes hits to another.
+ * (LSP_ADDRESSES defined where a section is too large for a storage buffer); or use the ready trace shader
+ * here, which reads rays from a buffer and writes hits to another.
  *
  * Files that lsp-validate has not passed: switch robustBufferAccess on. lsp_open has checked the file's
  * frame, not the indices inside its sections, and the shader does not check them again.
@@ -53,7 +53,8 @@ typedef struct lsp_vulkan_limits {
   uint64_t max_storage_buffer_range; /* VkPhysicalDeviceLimits::maxStorageBufferRange */
   uint64_t import_alignment; /* minImportedHostPointerAlignment; 0 without VK_EXT_external_memory_host */
   uint32_t max_group_count;  /* VkPhysicalDeviceLimits::maxComputeWorkGroupCount[0] */
-  uint64_t max_buffer_size;  /* VkPhysicalDeviceMaintenance4Properties::maxBufferSize; 0: the device does not say */
+  uint64_t
+      max_buffer_size; /* VkPhysicalDeviceMaintenance4Properties::maxBufferSize; 0: the device does not say */
 } lsp_vulkan_limits;
 
 /* One buffer of the scene: file bytes [file_offset, file_offset + bytes) as they are. */
@@ -78,8 +79,8 @@ typedef struct lsp_vulkan_plan {
 #define LSP_VULKAN_BUFFER_USAGE (VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT)
 
 /* Plans the buffers of an open scene for `uses` (LSP_USE_*). LSP_ERROR_UNSUPPORTED when the file lacks what
- * is asked for; LSP_ERROR_LIMIT when a section is larger than a buffer of the device may be, or than a storage
- * buffer's range and addresses were not allowed. */
+ * is asked for; LSP_ERROR_LIMIT when a section is larger than a buffer of the device may be, or than a
+ * storage buffer's range and addresses were not allowed. */
 LSP_API lsp_status lsp_vulkan_plan_buffers(const lsp_scene* scene, uint32_t uses,
                                            const lsp_vulkan_limits* limits, lsp_vulkan_plan* plan,
                                            lsp_error* error);
@@ -151,11 +152,11 @@ LSP_API void lsp_vulkan_record_upload_barrier(const lsp_vulkan_functions* functi
  * LSP_DIAL_TABLES alone does without LSP_PART_CELL_EXACT. */
 LSP_API uint32_t lsp_vulkan_parts(const lsp_scene* scene);
 
-/* SPIR-V (for Vulkan 1.1) of the trace shader for scenes planned like `plan` (of cells: for approximate rays; for exact
- * ones set base_structure of a copy to LSP_BASE_BVH), entry point "main"; with `counting`
- * nonzero the one that adds to the counters. Only base_structure and addresses of the plan matter; with addresses
- * the device's bufferDeviceAddress feature must be on, else no feature is needed. Sets *bytes to the size. The words
- * live as long as the program. */
+/* SPIR-V (for Vulkan 1.1) of the trace shader for scenes planned like `plan` (of cells: for approximate rays;
+ * for exact ones set base_structure of a copy to LSP_BASE_BVH), entry point "main"; with `counting` nonzero
+ * the one that adds to the counters. Only base_structure and addresses of the plan matter; with addresses the
+ * device's bufferDeviceAddress feature must be on, else no feature is needed. Sets *bytes to the size. The
+ * words live as long as the program. */
 LSP_API const uint32_t* lsp_vulkan_trace_spirv(const lsp_vulkan_plan* plan, int counting, size_t* bytes);
 
 /* The bindings of its descriptor set layout. */
