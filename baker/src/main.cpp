@@ -47,8 +47,17 @@ std::vector<std::string> names_of(const std::vector<Material>& materials) {
                     " notes, which --strict refuses: mend the input or leave out --strict");
 }
 
+// Before the work: a bake takes seconds to minutes.
+void check_folder(const std::filesystem::path& output) {
+  const std::filesystem::path folder = output.has_parent_path() ? output.parent_path() : ".";
+  if (!std::filesystem::is_directory(folder))
+    throw Failure(Exit::kFile, output.string(),
+                  "cannot be written: there is no folder " + folder.string() + ", make it or choose another");
+}
+
 Exit run(Arguments a) {
   settle(a);
+  check_folder(a.output);
   std::unique_ptr<tbb::global_control> control;
   if (a.threads)
     control = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism, a.threads);

@@ -31,9 +31,8 @@ int main(int argc, char** argv) {
                       .tmin = 0.0f,
                       .direction = {0.0f, -1.0f, 0.0f},
                       .tmax = INFINITY};
-  /* Approximate where the file has Line Spaces, exact otherwise. */
-  const int line_spaces = (scene.header->required_features & LSP_FEATURE_LINE_SPACES) != 0;
-  const lsp_trace_options options = {.flags = line_spaces ? LSP_TRACE_APPROXIMATE : 0u};
+  /* Approximate where the file has cells or Line Spaces, exact otherwise. */
+  const lsp_trace_options options = {.flags = LSP_TRACE_APPROXIMATE};
   LspHit hit;
   if (lsp_trace(&scene, &options, &ray, &hit, 1, NULL, &error) != LSP_OK) return fail(argv[1], &error);
 
@@ -42,7 +41,7 @@ int main(int argc, char** argv) {
   } else {
     printf("hit triangle %u at distance %g, normal (%g, %g, %g)%s\n", hit.primitive, (double)hit.t,
            (double)hit.normal.x, (double)hit.normal.y, (double)hit.normal.z,
-           hit.flags & LSP_HIT_LINE_SPACE ? ", answered by a Line Space" : "");
+           hit.flags & LSP_HIT_LINE_SPACE ? ", answered by a table" : "");
   }
   lsp_unmap_file(&mapping);
   return 0;

@@ -71,6 +71,26 @@ TEST_F(LspBake, PresetsOfCellsDiffer) {
   EXPECT_FALSE(read("fast.lsp") == read("accurate.lsp"));
 }
 
+TEST_F(LspBake, TheBaseFollowsFromTheOptions) {
+  write_grid("small.obj", 6);
+  const auto base = [&](const std::string& options) {
+    EXPECT_EQ(run("small.obj -o a.lsp " + options), 0) << options << read("err");
+    const std::string bytes = read("a.lsp");
+    const size_t at = bytes.find("\"base\":\"");
+    return at == std::string::npos ? "" : bytes.substr(at + 8, bytes.find('"', at + 8) - at - 8);
+  };
+  EXPECT_EQ(base(""), "cells");
+  EXPECT_EQ(base("--max-error 50"), "cells");
+  EXPECT_EQ(base("--cells 3 --preset fast"), "cells");
+  EXPECT_EQ(base("--no-exact"), "cells");
+  EXPECT_EQ(base("--resolution 3"), "bvh");
+  EXPECT_EQ(base("--no-line-spaces"), "bvh");
+  EXPECT_EQ(base("--for visibility"), "bvh");
+  EXPECT_EQ(base("--base ntree"), "ntree");
+  EXPECT_EQ(run("small.obj -o a.lsp --cells 3 --depth 4"), 1);
+  EXPECT_NE(read("err").find("cells have tables of their own"), std::string::npos) << read("err");
+}
+
 TEST_F(LspBake, HelpBeginsWithWhatMostPeopleNeed) {
   ASSERT_EQ(run("--help"), 0);
   const std::string help = read("out");
@@ -145,7 +165,7 @@ TEST_F(LspBake, EveryFileReadIsInTheHashAndTheDepfile) {
 }
 
 TEST_F(LspBake, KeepsWhatTheErrorAllows) {
-  ASSERT_EQ(run("grid.obj -o a.lsp --max-error 20 --json"), 0);
+  ASSERT_EQ(run("grid.obj -o a.lsp --base bvh --max-error 20 --json"), 0);
   EXPECT_LE(nlohmann::json::parse(read("out"))["error"]["wrong_percent"], 20.0);
   // Of cells it is the point of the dial that is chosen.
   for (const double allowed : {20.0, 0.5}) {
