@@ -64,7 +64,8 @@ extern "C" lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options*
 #ifdef LSP_SIMD
     const bool wide = !partial && counts == nullptr && count >= lsp::kFewRays;
     if (const lsp::WideCells* loop = wide ? lsp::wide_cells(*scene) : nullptr; loop != nullptr) {
-      loop->trace(*scene, (options->flags & LSP_TRACE_ANY_HIT) != 0, lsp_dial(scene, options), rays, hits, count);
+      loop->trace(*scene, (options->flags & LSP_TRACE_ANY_HIT) != 0, lsp_dial(scene, options), rays, hits,
+                  count);
       return LSP_OK;
     }
 #endif
