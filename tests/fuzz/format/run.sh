@@ -1,23 +1,25 @@
 #!/usr/bin/env bash
 # Runs the fuzzers of the format one after the other and says what they did.
 #
-#   run.sh BUILD-FOLDER SECONDS
+#   run.sh BUILD-FOLDER SECONDS [SEED]
 #
-# Exit 3 when there is a finding.
+# Exit 3 when there is a finding, whose log is shown. SEED makes a run
+# repeatable, up to where its time ends; without it every run goes another way.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 root=$(cd "$here/../../.." && pwd)
 build=$1
 seconds=$2
+seed=${3:-0}
 work=$build/fuzz-format
 findings=0
 for name in open trace packed; do
   mkdir -p "$work/corpus-$name"
   log=$work/$name.log
-  LLVM_PROFILE_FILE="$work/$name.profraw" "$build/bin/fuzz_format_$name" -max_total_time="$seconds" -timeout=10 \
+  LLVM_PROFILE_FILE="$work/$name.profraw" "$build/bin/fuzz_format_$name" -max_total_time="$seconds" -seed="$seed" -timeout=10 \
     -max_len=12288 -rss_limit_mb=3000 -dict="$here/lsp.dict" -print_final_stats=1 -artifact_prefix="$work/$name-" \
     "$work/corpus-$name" "$root"/format-spec/corpus/*/valid "$root"/format-spec/corpus/*/invalid >"$log" 2>&1 ||
-    { findings=1; echo "fuzz_format_$name: FINDING, see $log"; }
+    { findings=1; echo "fuzz_format_$name: FINDING, see $log"; tail -n 60 "$log" | cut -c1-4000; }
   executions=$(sed -n 's/^stat::number_of_executed_units: *//p' "$log")
   coverage=$(grep -oE 'cov: [0-9]+ ft: [0-9]+' "$log" | tail -1)
   echo "fuzz_format_$name: $executions executions, $coverage"

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # The fuzzers' short run for every test run: builds them with Clang beside the other builds and gives each a few
-# seconds.
+# seconds, from the same seed and the corpus alone, so that one run of the tests is like the next; findings are looked
+# for by run.sh over hours.
 #
 #   short.sh SOURCE-FOLDER BUILD-FOLDER SECONDS
 #
@@ -28,4 +29,5 @@ cmake -S "$source" -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo -DCMAK
   -DCMAKE_C_COMPILER="${clang/clang++/clang}" "${launcher[@]}" >"$build/configure.log" 2>&1 ||
   { tail -20 "$build/configure.log"; exit 4; }
 cmake --build "$build" --target fuzz_format >"$build/build.log" 2>&1 || { tail -40 "$build/build.log"; exit 4; }
-exec "$source/tests/fuzz/format/run.sh" "$build" "$seconds"
+rm -rf "$build"/fuzz-format/corpus-*
+exec "$source/tests/fuzz/format/run.sh" "$build" "$seconds" 1
