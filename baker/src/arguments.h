@@ -27,8 +27,6 @@ struct Arguments {
   bool no_exact = false;
   bool exact = false;
   bool no_line_spaces = false;
-  bool conservative = false;
-  bool directed = false;
   std::string compress = "none";
   uint32_t align = 4096;
   uint32_t threads = 0;

@@ -10,10 +10,10 @@
 #include <numeric>
 #include <optional>
 
-#include "conservative.h"
 #include "lsp/lsp.h"
 #include "lsp/program.h"
 #include "shaft_raster.h"
+#include "triangle_box.h"
 #include "vectors.h"
 
 namespace lsp {
@@ -87,22 +87,17 @@ class Filler {
     // rounding of a passage (lsp/traverse.h), far less than a patch.
     const glm::vec3 lo = vec(site.lo), hi = vec(site.hi);
     binary_ = options.kind == LineSpaceKind::kBinary && !holds_gaps(site.subtree);
-    conservative_ = binary_ && options.conservative;
     const glm::vec3 extent = hi - lo;
     const glm::vec3 reach = glm::max(glm::abs(lo), glm::abs(hi));
     const float margin = std::max({extent.x, extent.y, extent.z}) * 1e-4f +
                          std::max({reach.x, reach.y, reach.z}) * 3.8146973e-6f;
-    // Geometry of a node then is inside by the margin too, and need not be looked for outside.
-    if (conservative_) empty_margin_ = empty_margin(header);
-    lo_ = lo - std::max(margin, 2 * float(empty_margin_));
-    hi_ = hi + std::max(margin, 2 * float(empty_margin_));
+    lo_ = lo - margin;
+    hi_ = hi + margin;
   }
 
   Filled run() {
     const uint32_t n = options_.resolution;
-    if (conservative_) return pack(touched());
-    const bool symmetric = binary_ && !options_.directed;
-    const uint32_t shafts = (symmetric ? 15 : 30) * n * n * n * n;
+    const uint32_t shafts = (binary_ ? 15 : 30) * n * n * n * n;
     std::vector<uint32_t> hit(shafts, LSP_NONE);
     const uint32_t patches = n * n;
     samples_ = shaft_samples(binary_ ? 1 : options_.samples);
@@ -111,12 +106,12 @@ class Filler {
     raster_.emplace(lo_, hi_, n);
     if (!gather(site_.subtree)) raster_.reset();
     for (uint32_t in = 0; in < 6; ++in)
-      for (uint32_t out = symmetric ? in + 1 : 0; out < 6; ++out) {
+      for (uint32_t out = binary_ ? in + 1 : 0; out < 6; ++out) {
         if (in == out) continue;
         aim(out);
         for (uint32_t p = 0; p < patches; ++p) {
           const uint32_t base =
-              symmetric ? LSP_SHAFT_INDEX_SYMMETRIC(in, out, p, 0u, n) : LSP_SHAFT_INDEX(in, out, p, 0u, n);
+              binary_ ? LSP_SHAFT_INDEX_SYMMETRIC(in, out, p, 0u, n) : LSP_SHAFT_INDEX(in, out, p, 0u, n);
           fill_row(in, p, out, &hit[base]);
         }
       }
@@ -124,42 +119,6 @@ class Filler {
   }
 
  private:
-  // The shafts that a triangle touches, in either direction, and one such triangle each.
-  std::vector<uint32_t> touched() const {
-    const uint32_t n = options_.resolution, patches = n * n;
-    std::vector<uint32_t> either(15 * patches * patches, LSP_NONE);
-    TouchedShafts shafts(lo_, hi_, empty_margin_, n);
-    add_touched(site_.subtree, shafts, either);
-    if (!options_.directed) return either;
-    std::vector<uint32_t> directed(30 * patches * patches, LSP_NONE);
-    for (uint32_t in = 0; in < 6; ++in)
-      for (uint32_t out = in + 1; out < 6; ++out)
-        for (uint32_t p = 0; p < patches; ++p)
-          for (uint32_t q = 0; q < patches; ++q)
-            directed[LSP_SHAFT_INDEX(in, out, p, q, n)] = directed[LSP_SHAFT_INDEX(out, in, q, p, n)] =
-                either[LSP_SHAFT_INDEX_SYMMETRIC(in, out, p, q, n)];
-    return directed;
-  }
-
-  // A node of the BVH counts with all its triangles, a cell of an NTree with those that reach into it.
-  void add_touched(uint32_t child, TouchedShafts& shafts, std::vector<uint32_t>& either) const {
-    const bool in_cell = header_.ntree_branching != 0;
-    const glm::dvec3 grown(2.0 * header_.ntree_margin);
-    const glm::dvec3 lo = glm::dvec3(vec(site_.lo)) - grown, hi = glm::dvec3(vec(site_.hi)) + grown;
-    const auto apart = [&](const lsp_float3& l, const lsp_float3& h) {
-      return l.x > hi.x || l.y > hi.y || l.z > hi.z || h.x < lo.x || h.y < lo.y || h.z < lo.z;
-    };
-    if (!(child & LSP_LEAF_BIT)) {
-      const LspNode& node = scene_.nodes[child];
-      if (!in_cell || !apart(node.lo0, node.hi0)) add_touched(node.child0, shafts, either);
-      if (!in_cell || !apart(node.lo1, node.hi1)) add_touched(node.child1, shafts, either);
-      return;
-    }
-    const uint32_t first = child & LSP_LEAF_FIRST_MASK;
-    for (uint32_t i = first; i <= first + (child >> LSP_LEAF_COUNT_SHIFT & LSP_LEAF_COUNT_MASK); ++i)
-      if (!in_cell || reaches_into(scene_.triangles[i], lo, hi)) shafts.add(scene_.triangles[i], i, either);
-  }
-
   // Whether a triangle that reaches into the box of the site is there in part.
   bool holds_gaps(uint32_t child) const {
     const auto apart = [&](const lsp_float3& l, const lsp_float3& h) {
@@ -329,8 +288,7 @@ class Filler {
                      f3(scale),
                      first,
                      n | bytes << LSP_FORMAT_ENTRY_SHIFT | (dense ? LSP_FORMAT_DENSE : 0) |
-                         (binary_ && !options_.directed ? LSP_FORMAT_SYMMETRIC : 0) |
-                         (conservative_ ? LSP_FORMAT_CONSERVATIVE : 0),
+                         (binary_ ? LSP_FORMAT_SYMMETRIC : 0),
                      filled,
                      count,
                      site_.child};
@@ -366,8 +324,7 @@ class Filler {
   const LineSpaceSite& site_;
   lsp_scene scene_{};
   glm::vec3 lo_, hi_;
-  bool binary_ = false, conservative_ = false;
-  double empty_margin_ = 0;
+  bool binary_ = false;  // and symmetric
   std::vector<Sample> samples_;
   std::optional<ShaftRaster> raster_;  // none: too many triangles, the rays are traced
   // The row being filled.
@@ -396,7 +353,7 @@ LineSpaces fill_line_spaces(const Bvh& bvh, const LspHeader& header, std::span<c
   }
   const uint32_t n = options.resolution;
   const auto shafts_of = [n](bool symmetric) { return (symmetric ? 15ull : 30ull) * n * n * n * n; };
-  const uint64_t shafts = shafts_of(options.kind == LineSpaceKind::kBinary && !options.directed);
+  const uint64_t shafts = shafts_of(options.kind == LineSpaceKind::kBinary);
   references.assign(sites.size(), LSP_NONE);
   // A batch at a time, so that no more than one is in memory twice.
   const size_t batch_sites = size_t(std::max<uint64_t>(2, options.batch_bytes / (shafts * kBytesPerShaft)));

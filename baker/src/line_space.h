@@ -27,8 +27,6 @@ inline bool has_gaps(const LspTriangle& t) { return t.flags >> LSP_TRIANGLE_GAPS
 
 struct LineSpaceOptions {
   LineSpaceKind kind = LineSpaceKind::kCandidates;
-  bool directed = false;               // binary: a bit for either direction of a shaft
-  bool conservative = false;           // binary: a clear bit proves the shaft empty (conservative.h)
   uint32_t resolution = 6;             // N: patches along an edge of the box, 1 to LSP_MAX_RESOLUTION
   std::vector<uint32_t> depths = {9};  // D: inner nodes at these depths carry a Line Space (the root is at 0)
   // Rays per shaft that choose its candidate: 1 is the paper's centroid ray, more pick the triangle (or none)

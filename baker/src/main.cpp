@@ -146,14 +146,6 @@ int main(int argc, char** argv) {
                                                                          {"glossy", Purpose::kGlossy},
                                                                          {"all", Purpose::kAll}}))
       ->default_str("all");
-  app.add_flag(
-      "--conservative", a.conservative,
-      "With --for visibility: a shaft counts as empty only where no triangle touches it, so that exact "
-      "rays may skip it (lsp-trace --skip-empty)");
-  app.add_flag(
-      "--directed", a.directed,
-      "With --for visibility: a bit for either direction of a shaft, 30 N^4 and not 15 N^4; both are "
-      "alike, what is inside does not depend on the direction");
   app.add_flag("--exact", a.exact, "Keep the exact tree below the Line Spaces (the default)");
   app.add_flag("--no-exact", a.no_exact, "Keep only what approximate rays need");
   app.add_flag("--no-line-spaces", a.no_line_spaces, "Bake the exact tree alone");
@@ -189,7 +181,6 @@ int main(int argc, char** argv) {
                 {"Line Spaces",
                  {"--resolution", "--depth", "--triangles", "--samples", "--normal-angle DEGREES",
                   "--plane-tolerance", "--no-line-spaces", "--exact", "--no-exact"}},
-                {"Line Spaces of --for visibility", {"--conservative", "--directed"}},
                 {"What is read", {"--crease-angle DEGREES", "--strict", "--depfile FILE"}},
                 {"The machine and the file", {"--threads", "--memory-limit", "--align"}}});
   return run_program("lsp-bake", app, argc, argv, [&] {

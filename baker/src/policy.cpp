@@ -29,8 +29,7 @@ const std::map<std::string, Base> kBases = {
 // What only Line Spaces have.
 bool asks_for_line_spaces(const Arguments& a) {
   return a.resolution_given || a.depth_given || a.samples_given || a.triangles != 0 || a.no_line_spaces ||
-         a.conservative || a.directed || a.purpose == Purpose::kVisibility || a.normal_angle != 180 ||
-         a.plane_tolerance != 0;
+         a.purpose == Purpose::kVisibility || a.normal_angle != 180 || a.plane_tolerance != 0;
 }
 
 std::string base_of(const Arguments& a) {
@@ -47,8 +46,6 @@ void check(const Arguments& a) {
                   "--max-error chooses --resolution, --depth and --samples itself, leave them out");
   if (a.max_error > 0 && (a.no_line_spaces || a.purpose == Purpose::kVisibility))
     throw Failure(Exit::kUsage, "", "--max-error needs Line Spaces with candidates");
-  if ((a.conservative || a.directed) && (a.purpose != Purpose::kVisibility || a.no_line_spaces))
-    throw Failure(Exit::kUsage, "", "--conservative and --directed need the Line Spaces of --for visibility");
   const bool ntree = a.base == "ntree";
   if (!ntree && (a.branching || a.levels != kNTreeLevels))
     throw Failure(Exit::kUsage, "", "--branching and --levels need --base ntree");
@@ -80,8 +77,6 @@ BakeOptions bake_options(const Arguments& a) {
   options.line_space.triangles = a.triangles;
   options.line_space.kind =
       a.purpose == Purpose::kVisibility ? LineSpaceKind::kBinary : LineSpaceKind::kCandidates;
-  options.line_space.conservative = a.conservative;
-  options.line_space.directed = a.directed;
   options.line_space.exact = !a.no_exact;
   options.normal_angle_degrees = a.normal_angle;
   options.plane_tolerance = a.plane_tolerance;

@@ -74,9 +74,7 @@ extern "C" lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options*
           counts);
     return LSP_OK;
   }
-  uint32_t flags = options->flags & (approximate ? lsp::kApproximateFlags : lsp::kExactFlags);
-  constexpr uint32_t kConservative = LSP_FEATURE_LINE_SPACES | LSP_FEATURE_BINARY;  // what such a file has
-  if ((features & kConservative) != kConservative) flags &= ~LSP_TRACE_SKIP_EMPTY;
+  uint32_t flags = options->flags & (approximate ? LSP_TRACE_ALL_FLAGS : LSP_TRACE_ANY_HIT);
   if (flags & LSP_TRACE_NEAR_APPROXIMATE) flags &= ~LSP_TRACE_NEAR_SKIP;
   const bool ntree = scene->header->base_structure == LSP_BASE_NTREE;
   const lsp::TraceLoops& loops = partial ? (ntree ? lsp::partial::kNTreeLoops : lsp::partial::kBvhLoops)

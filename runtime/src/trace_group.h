@@ -196,8 +196,8 @@ template <class Traversal, uint32_t kFlags>
 constexpr TraceLoop loop_of() {
   constexpr uint32_t kBothNear = LSP_TRACE_NEAR_APPROXIMATE | LSP_TRACE_NEAR_SKIP;
   if constexpr ((kFlags & LSP_TRACE_APPROXIMATE) == 0)
-    return (kFlags & ~kExactFlags) == 0 ? trace_singly<Traversal, kFlags & kExactFlags> : nullptr;
-  else if constexpr ((kFlags & ~kApproximateFlags) == 0 && (kFlags & kBothNear) != kBothNear)
+    return (kFlags & ~LSP_TRACE_ANY_HIT) == 0 ? trace_singly<Traversal, kFlags & LSP_TRACE_ANY_HIT> : nullptr;
+  else if constexpr ((kFlags & kBothNear) != kBothNear)
     return trace_group<Traversal, kFlags>;
   else
     return nullptr;

@@ -9,10 +9,6 @@ namespace lsp {
 using TraceLoop = void (*)(const lsp_scene&, float lod, const LspRay*, LspHit*, uint64_t count,
                            lsp_trace_counts* counts);
 
-// What an exact trace heeds, and an approximate one.
-constexpr uint32_t kExactFlags = LSP_TRACE_ANY_HIT | LSP_TRACE_SKIP_EMPTY;
-constexpr uint32_t kApproximateFlags = LSP_TRACE_ALL_FLAGS & ~LSP_TRACE_SKIP_EMPTY;
-
 // The loops by LSP_TRACE_* flags; null: flags that exclude each other.
 struct TraceLoops {
   TraceLoop of[LSP_TRACE_ALL_FLAGS + 1];

@@ -25,7 +25,6 @@ struct Options {
   std::string query = "closest";
   std::string load_path = "automatic";
   std::string device;
-  bool skip_empty = false;
   TraceArguments trace;
   uint32_t repeats = 1;
   uint32_t threads = std::max(1u, std::thread::hardware_concurrency());
@@ -48,8 +47,6 @@ void define(CLI::App& app, Options& options) {
   app.add_option("--query", options.query, "The closest hit or any hit")
       ->check(CLI::IsMember({"closest", "any"}));
   add_trace_arguments(app, options.trace);
-  app.add_flag("--skip-empty", options.skip_empty,
-               "Exact: leave out nodes whose shaft a conservative Line Space proves empty; the same answers");
   app.add_option("--repeat", options.repeats, "Times to trace all rays")->check(CLI::Range(1u, 1000000u));
   app.add_option("--threads", options.threads, "Threads of the CPU backend; all without it")
       ->check(CLI::Range(1u, 65536u));
@@ -61,7 +58,6 @@ void define(CLI::App& app, Options& options) {
                {{"What most people need",
                  {"FILE.lsp", "--rays FILE", "--hits FILE", "--mode", "--query", "--backend"}},
                 {"Approximate mode", {"--near", "--lod", "--quality", "--max-loss PERCENT"}},
-                {"Exact mode", {"--skip-empty"}},
                 {"The machine", {"--repeat", "--threads", "--device NAME", "--load"}}});
 }
 
@@ -79,7 +75,6 @@ TraceRequest make_request(const Options& options, const LspHeader& header) {
   const bool approximate = options.mode.empty() ? line_spaces : options.mode == "approximate";
   request.options = to_trace_options(options.trace, approximate);
   if (options.query == "any") request.options.flags |= LSP_TRACE_ANY_HIT;
-  if (options.skip_empty) request.options.flags |= LSP_TRACE_SKIP_EMPTY;
   request.vulkan = options.backend == "vulkan";
   request.repeats = options.repeats;
   request.threads = options.threads;
@@ -101,7 +96,6 @@ nlohmann::ordered_json to_json(const Options& options, const TraceRequest& reque
   json["mode"] = (request.options.flags & LSP_TRACE_APPROXIMATE) != 0 ? "approximate" : "exact";
   json["query"] = options.query;
   json["near"] = options.trace.near;
-  json["skip_empty"] = options.skip_empty;
   json["lod"] = options.trace.lod;
   json["threads"] = request.vulkan ? 0u : options.threads;
   json["rays"] = counts.rays;
@@ -172,8 +166,6 @@ Exit run(const Options& options) {
     const bool approximate = (request.options.flags & LSP_TRACE_APPROXIMATE) != 0;
     for (const std::string& note : unused_arguments(options.trace, approximate, file.header()))
       std::cerr << "lsp-trace: " << options.file << ": " << note << "\n";
-    if (options.skip_empty && (file.header().required_features & LSP_FEATURE_CELLS) != 0)
-      std::cerr << "lsp-trace: " << options.file << ": --skip-empty does nothing: the file has cells\n";
   }
   nlohmann::ordered_json json;
   try {

@@ -109,9 +109,7 @@ TraceReport trace_on_vulkan(const lsp_scene& scene, const TraceRequest& request,
   options.device = request.device;
   VulkanTracer tracer(options);
   const bool approximate = (request.options.flags & LSP_TRACE_APPROXIMATE) != 0;
-  uint32_t uses = approximate ? LSP_USE_APPROXIMATE : LSP_USE_EXACT;
-  if ((request.options.flags & LSP_TRACE_SKIP_EMPTY) != 0) uses |= LSP_USE_APPROXIMATE;
-  tracer.load(scene, uses, request.load_path);
+  tracer.load(scene, approximate ? LSP_USE_APPROXIMATE : LSP_USE_EXACT, request.load_path);
   TraceReport report;
   report.device = tracer.device_name();
   report.load_path = name_of(tracer.load_path());

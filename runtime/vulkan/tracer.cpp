@@ -416,19 +416,14 @@ VulkanTrace VulkanTracer::Impl::trace(const lsp_trace_options& wanted, std::span
                                       std::span<LspHit> hits, bool count) {
   // Flags that have no meaning together make no pipeline of their own.
   lsp_trace_options options = wanted;
-  options.flags &= (wanted.flags & LSP_TRACE_APPROXIMATE) != 0 ? LSP_TRACE_ALL_FLAGS & ~LSP_TRACE_SKIP_EMPTY
-                                                               : LSP_TRACE_ANY_HIT | LSP_TRACE_SKIP_EMPTY;
+  options.flags &= (wanted.flags & LSP_TRACE_APPROXIMATE) != 0 ? LSP_TRACE_ALL_FLAGS : LSP_TRACE_ANY_HIT;
   if ((options.flags & LSP_TRACE_NEAR_APPROXIMATE) != 0) options.flags &= ~LSP_TRACE_NEAR_SKIP;
-  constexpr uint32_t kConservative = LSP_FEATURE_LINE_SPACES | LSP_FEATURE_BINARY;  // what such a file has
-  if (scene_.header == nullptr || (scene_.header->required_features & kConservative) != kConservative)
-    options.flags &= ~LSP_TRACE_SKIP_EMPTY;
   dial_ = 0;
   if (scene_.header != nullptr && (scene_.header->required_features & LSP_FEATURE_CELLS) != 0) {
     options.flags &= LSP_TRACE_APPROXIMATE | LSP_TRACE_ANY_HIT;
     if ((options.flags & LSP_TRACE_APPROXIMATE) != 0) dial_ = lsp_dial(&scene_, &wanted);
   }
-  uint32_t needed = (options.flags & LSP_TRACE_APPROXIMATE) != 0 ? LSP_USE_APPROXIMATE : LSP_USE_EXACT;
-  if ((options.flags & LSP_TRACE_SKIP_EMPTY) != 0) needed |= LSP_USE_APPROXIMATE;
+  const uint32_t needed = (options.flags & LSP_TRACE_APPROXIMATE) != 0 ? LSP_USE_APPROXIMATE : LSP_USE_EXACT;
   if (scene_buffers == nullptr || (uses_ & needed) != needed) {
     throw Failure(Exit::kUnsupported, "", "the scene is not loaded for this kind of trace");
   }

@@ -86,10 +86,7 @@ std::vector<lsp_trace_options> modes_of(const lsp_scene& scene) {
   std::vector<lsp_trace_options> modes;
   const uint32_t features = scene.header->required_features;
   for (const uint32_t any : {0u, LSP_TRACE_ANY_HIT}) {
-    if (features & LSP_FEATURE_EXACT) {
-      modes.push_back({any, 0});
-      modes.push_back({any | LSP_TRACE_SKIP_EMPTY, 0});
-    }
+    if (features & LSP_FEATURE_EXACT) modes.push_back({any, 0});
     const uint32_t approximate = LSP_TRACE_APPROXIMATE | any;
     modes.push_back({approximate, 0});
     if (features & LSP_FEATURE_LINE_SPACES) {
@@ -228,7 +225,6 @@ struct Kind {
   Base base;
   Purpose purpose = Purpose::kAll;
   bool exact = true;
-  bool conservative = false;
 };
 constexpr Kind kKinds[] = {
     {"bvh", Base::kBvh},
@@ -238,8 +234,6 @@ constexpr Kind kKinds[] = {
     {"cells_ao", Base::kCells, Purpose::kAo},
     {"bvh_visibility", Base::kBvh, Purpose::kVisibility},
     {"ntree_visibility", Base::kNTree, Purpose::kVisibility},
-    {"bvh_conservative", Base::kBvh, Purpose::kVisibility, true, true},
-    {"ntree_conservative", Base::kNTree, Purpose::kVisibility, true, true},
     {"bvh_approximate_only", Base::kBvh, Purpose::kAll, false},
     {"ntree_approximate_only", Base::kNTree, Purpose::kAll, false},
     {"cells_tables_only", Base::kCells, Purpose::kAll, false},
@@ -247,7 +241,6 @@ constexpr Kind kKinds[] = {
 
 lsp::Baked bake_kind(const Mesh& mesh, const Kind& kind, std::vector<uint32_t> depths = {}) {
   BakeOptions options = options_of(kind.base, kind.purpose);
-  options.line_space.conservative = kind.conservative;
   options.line_space.exact = kind.exact;
   if (!depths.empty() && (kind.base == Base::kBvh || depths[0] == 0))
     options.line_space.depths = std::move(depths);

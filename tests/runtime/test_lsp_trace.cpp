@@ -91,8 +91,6 @@ TEST_F(LspTrace, WritesTheLibrarysHits) {
       {"--mode approximate --near approximate", LSP_TRACE_APPROXIMATE | LSP_TRACE_NEAR_APPROXIMATE},
       {"--mode approximate --near skip", LSP_TRACE_APPROXIMATE | LSP_TRACE_NEAR_SKIP},
       {"--mode exact --threads 3", 0},
-      {"--mode exact --skip-empty", LSP_TRACE_SKIP_EMPTY},
-      {"--mode exact --query any --skip-empty", LSP_TRACE_SKIP_EMPTY | LSP_TRACE_ANY_HIT},
   };
   for (const auto& c : cases) {
     for (const char* file : {"raw.lsp", "packed.lsp"}) {

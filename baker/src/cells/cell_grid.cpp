@@ -7,8 +7,8 @@
 #include <string>
 
 #include "../vectors.h"
-#include "conservative.h"
 #include "lsp/program.h"
+#include "triangle_box.h"
 
 namespace lsp {
 namespace {

@@ -19,12 +19,11 @@ struct LspChildren {
   uint first;
   uint second;
   float second_t; /* where the ray enters it */
-  uint shafts;    /* look-ups made */
 };
 
 /* Nearer of the two first; for any hit child 0, which the builder chose to be of larger area, where a hit is
  * likeliest. */
-LSP_FN LspChildren lsp_children(LspScene scene, LspSetup s, LspQuery q, LspNode node, float best_t) {
+LSP_FN LspChildren lsp_children(LspSetup s, LspQuery q, LspNode node, float best_t) {
   vec3 lo0 = lsp_vec3(node.lo0);
   vec3 hi0 = lsp_vec3(node.hi0);
   vec3 lo1 = lsp_vec3(node.lo1);
@@ -33,11 +32,9 @@ LSP_FN LspChildren lsp_children(LspScene scene, LspSetup s, LspQuery q, LspNode 
   float t1 = lsp_box(s, lo1, hi1, best_t);
   uint ref0 = LSP_NONE;
   uint ref1 = LSP_NONE;
-  if (t0 <= best_t) ref0 = lsp_visit(scene, s, q, node.child0, node.line_space0, lo0, hi0, t0);
-  if (t1 <= best_t) ref1 = lsp_visit(scene, s, q, node.child1, node.line_space1, lo1, hi1, t1);
+  if (t0 <= best_t) ref0 = lsp_visit(s, q, node.child0, node.line_space0, lo0, hi0, t0);
+  if (t1 <= best_t) ref1 = lsp_visit(s, q, node.child1, node.line_space1, lo1, hi1, t1);
   LspChildren children;
-  children.shafts = (t0 <= best_t ? lsp_visit_shafts(q, node.line_space0) : 0u) +
-                    (t1 <= best_t ? lsp_visit_shafts(q, node.line_space1) : 0u);
   children.second = LSP_NONE;
   children.second_t = t1;
   if (ref0 == LSP_NONE || ref1 == LSP_NONE) {
@@ -71,8 +68,7 @@ LSP_STEP void lsp_begin(LspScene scene, LspSetup s, LspQuery q) {
   float t = lsp_box(s, lo, hi, s.tmax);
   if (t <= s.tmax) {
     uint line_space = lsp_load_header(scene).root_line_space;
-    lsp_walk.ref = lsp_visit(scene, s, q, lsp_load_header(scene).root, line_space, lo, hi, t);
-    lsp_walk.counts.shafts += lsp_visit_shafts(q, line_space);
+    lsp_walk.ref = lsp_visit(s, q, lsp_load_header(scene).root, line_space, lo, hi, t);
   }
   lsp_stack_ref[0] = lsp_walk.ref;
 }
@@ -108,7 +104,6 @@ LSP_STEP void lsp_advance(LspScene scene, LspSetup s, LspQuery q) {
   float best_t = lsp_walk.best.t;
   uint most = lsp_most_steps(scene, q);
   uint step = lsp_walk.step;
-  uint shafts = 0u;
   LspNext next;
   next.ref = lsp_walk.ref;
   next.top = found ? 0u : lsp_walk.top;
@@ -116,8 +111,7 @@ LSP_STEP void lsp_advance(LspScene scene, LspSetup s, LspQuery q) {
   bool down = lsp_is_node(next.ref) || (next.ref != LSP_NONE && step >= most);
   while (down && step < most) {
     ++step;
-    LspChildren children = lsp_children(scene, s, q, lsp_load_node(scene, next.ref), best_t);
-    shafts += children.shafts;
+    LspChildren children = lsp_children(s, q, lsp_load_node(scene, next.ref), best_t);
     next.ref = children.first;
     if (children.second != LSP_NONE) {
       if (next.top >= LSP_STACK_SIZE) break;
@@ -130,7 +124,6 @@ LSP_STEP void lsp_advance(LspScene scene, LspSetup s, LspQuery q) {
     down = lsp_is_node(next.ref);
   }
   lsp_walk.counts.nodes += step - lsp_walk.step;
-  lsp_walk.counts.shafts += shafts;
   lsp_walk.step = step + 1u;
   lsp_walk.top = next.top;
   lsp_walk.ref = down ? LSP_NONE : next.ref; /* down: out of steps or of stack, or cut short */

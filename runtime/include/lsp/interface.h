@@ -48,16 +48,10 @@ LSP_END(LspHit)
  * the origin for a small error; ignored with LSP_TRACE_NEAR_APPROXIMATE. */
 #define LSP_TRACE_NEAR_SKIP 0x8u
 
-/* Exact traces: ask conservative Line Spaces (lsp-bake --conservative) first, and leave out a node whose
- * shaft is proven empty. The answers are the same to the bit, any hit's too; fewer nodes are visited, for a
- * look-up at every Line Space passed. Does nothing in approximate traces, in files without such Line
- * Spaces, and for rays that begin further than about two extents from the scene, whose rounding the Line
- * Spaces do not cover. */
-#define LSP_TRACE_SKIP_EMPTY 0x10u
-#define LSP_TRACE_ALL_FLAGS 0x1Fu /* that a traversal knows */
+#define LSP_TRACE_ALL_FLAGS 0xFu /* that a traversal knows */
 
 /* lsp_trace_options.max_loss sets the dial, not its quality. */
-#define LSP_TRACE_MAX_LOSS 0x20u
+#define LSP_TRACE_MAX_LOSS 0x10u
 
 /* ---- the trace shader ---------------------------------------------------------------------------------- */
 

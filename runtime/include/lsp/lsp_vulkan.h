@@ -33,7 +33,7 @@ extern "C" {
 
 /* What the scene is wanted for; a section that nothing asks for gets no buffer and is never read. */
 #define LSP_USE_EXACT 0x1u       /* exact traces: NODE (NTree: GRID, CELL, REFS), TRIA, NRML */
-#define LSP_USE_APPROXIMATE 0x2u /* approximate traces: these and LSPC, BITS, CAND; skipping too */
+#define LSP_USE_APPROXIMATE 0x2u /* approximate traces: these and LSPC, BITS, CAND */
 #define LSP_USE_MATERIALS 0x4u   /* MATL, for the engine's own shaders */
 
 /* And whether sections may be read through buffer device addresses instead of descriptors, where the device's

@@ -134,7 +134,7 @@ LSP_STEP void lsp_ntree_look(LspScene scene, LspSetup s, LspQuery q) {
   LspCell record = lsp_load_cell(scene, word.offset + uint(bitCount(word.bits & ((1u << bit) - 1u))));
   lsp_walk.count = record.count;
   lsp_walk.ref = record.child;
-  bool asks = (q.flags & (LSP_TRACE_APPROXIMATE | LSP_TRACE_SKIP_EMPTY)) != 0u;
+  bool asks = (q.flags & LSP_TRACE_APPROXIMATE) != 0u;
   if (q.far || (record.line_space != LSP_NONE && asks)) {
     vec3 lo = lsp_ntree_lo(scene, lsp_walk.cell, lsp_walk.size);
     vec3 hi = lsp_ntree_lo(scene, lsp_walk.cell + ivec3(1), lsp_walk.size);
@@ -142,10 +142,8 @@ LSP_STEP void lsp_ntree_look(LspScene scene, LspSetup s, LspQuery q) {
       lsp_walk.t = lsp_box(s, lo, hi, lsp_walk.best.t);
       if (!(lsp_walk.t <= lsp_walk.best.t)) lsp_walk.ref = LSP_NONE;
     }
-    if (lsp_walk.t <= lsp_walk.best.t) {
-      lsp_walk.ref = lsp_visit(scene, s, q, lsp_walk.ref, record.line_space, lo, hi, lsp_walk.t);
-      lsp_walk.counts.shafts += lsp_visit_shafts(q, record.line_space);
-    }
+    if (lsp_walk.t <= lsp_walk.best.t)
+      lsp_walk.ref = lsp_visit(s, q, lsp_walk.ref, record.line_space, lo, hi, lsp_walk.t);
   }
 }
 
@@ -217,8 +215,7 @@ LSP_STEP void lsp_begin(LspScene scene, LspSetup s, LspQuery q) {
     vec3 lo = lsp_vec3(lsp_load_header(scene).ntree_lo);
     vec3 hi = lo + vec3(lsp_load_header(scene).ntree_size);
     uint line_space = lsp_load_header(scene).root_line_space;
-    lsp_walk.ref = lsp_visit(scene, s, q, lsp_load_header(scene).root, line_space, lo, hi, lsp_walk.t);
-    lsp_walk.counts.shafts += lsp_visit_shafts(q, line_space);
+    lsp_walk.ref = lsp_visit(s, q, lsp_load_header(scene).root, line_space, lo, hi, lsp_walk.t);
   }
   lsp_parents[0] = lsp_walk.ref;
 }

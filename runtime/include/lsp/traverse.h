@@ -32,7 +32,6 @@
  * A box is therefore grown by err = 16 u R + 4 u max|o| on every side, which covers both, and the rounding of
  * o + err itself: no box is missed whose triangle would be hit, however thin the box is.
  */
-#include "lsp/empty_margin.h"
 #include "lsp/interface.h"
 #include "lsp/parts.h"
 
@@ -378,15 +377,6 @@ LSP_FN vec2 lsp_plane_weights(LspSetup s, LspTriangle tri, float t) {
   return weights;
 }
 
-/* Whether rounding moves a ray by no more than conservative Line Spaces allow for (lsp/empty_margin.h). */
-LSP_FN bool lsp_may_skip_empty(LspScene scene, LspSetup s) {
-  vec3 lo = lsp_vec3(lsp_load_header(scene).bounds_min);
-  vec3 hi = lsp_vec3(lsp_load_header(scene).bounds_max);
-  precise float limit =
-      LSP_EMPTY_EXTENT * lsp_largest(hi - lo) + LSP_EMPTY_REACH * lsp_max(lsp_largest(lo), lsp_largest(hi));
-  return s.err <= limit;
-}
-
 #ifndef LSP_CELLS
 /* Where the ray passes the box of a Line Space, and which shaft it takes. The shaft is in range for any ray;
  * a ray that misses the box has t_in > t_out. Entry and exit face are never the same one: on one axis they
@@ -547,26 +537,11 @@ LSP_FN bool lsp_is_near(uint ref) { return (ref >> 29u) == 3u; }
 
 LSP_FN uint lsp_line_space_index(uint ref) { return ref & LSP_STACK_INDEX_MASK; }
 
-/* Whether a Line Space proves that the ray, wherever it begins and ends, hits nothing in its node. */
-LSP_FN bool lsp_is_empty(LspScene scene, LspSetup s, uint index) {
-  LspLineSpace ls = lsp_load_line_space(scene, index);
-  if ((ls.format & LSP_FORMAT_CONSERVATIVE) == 0u || (ls.format & LSP_FORMAT_DENSE) != 0u) return false;
-  LspPassage pass = lsp_pass(s, ls);
-  if (!(pass.t_in <= pass.t_out)) return false;
-  return ((lsp_load_bit_word(scene, ls.word_first + (pass.shaft >> 5u)).bits >> (pass.shaft & 31u)) & 1u) ==
-         0u;
-}
-
-/* What to visit for a child hit at t_in: itself, or in an approximate trace its Line Space. Look-ups, but for
- * those that skip empty shafts, are left to the caller: a device that runs both sides of every branch would
- * do them for both children of every node. */
-LSP_FN uint lsp_visit(LspScene scene, LspSetup s, LspQuery q, uint child, uint line_space, vec3 lo, vec3 hi,
-                      float t_in) {
-  if (line_space == LSP_NONE) return child;
-  if ((q.flags & LSP_TRACE_APPROXIMATE) == 0u) {
-    if ((q.flags & LSP_TRACE_SKIP_EMPTY) == 0u) return child;
-    return lsp_is_empty(scene, s, line_space & LSP_LINE_SPACE_MASK) ? LSP_NONE : child;
-  }
+/* What to visit for a child hit at t_in: itself, or in an approximate trace its Line Space. The look-up
+ * is left to the caller: a device that runs both sides of every branch would do it for both children of every
+ * node. */
+LSP_FN uint lsp_visit(LspSetup s, LspQuery q, uint child, uint line_space, vec3 lo, vec3 hi, float t_in) {
+  if (line_space == LSP_NONE || (q.flags & LSP_TRACE_APPROXIMATE) == 0u) return child;
   bool exists = child != LSP_NONE;
   if (t_in <= s.tmin && (q.flags & LSP_TRACE_NEAR_APPROXIMATE) == 0u && exists) {
     if ((q.flags & LSP_TRACE_NEAR_SKIP) == 0u) return child;
@@ -578,12 +553,6 @@ LSP_FN uint lsp_visit(LspScene scene, LspSetup s, LspQuery q, uint child, uint l
     if (!(lsp_dot(extent, extent) < reach * reach)) return child;
   }
   return (line_space & LSP_LINE_SPACE_MASK) | LSP_STACK_LINE_SPACE_BIT;
-}
-
-/* Look-ups that lsp_visit makes. */
-LSP_FN uint lsp_visit_shafts(LspQuery q, uint line_space) {
-  bool skips = (q.flags & (LSP_TRACE_APPROXIMATE | LSP_TRACE_SKIP_EMPTY)) == LSP_TRACE_SKIP_EMPTY;
-  return skips && line_space != LSP_NONE ? 1u : 0u;
 }
 
 #ifdef LSP_NTREE
@@ -718,8 +687,6 @@ LSP_FN LspTraced lsp_invalid_ray() {
 
 /* Traces a valid ray from the root. */
 LSP_STEP LspTraced lsp_trace_ready(LspScene scene, LspSetup s, LspQuery q, LspRay ray) {
-  if ((q.flags & LSP_TRACE_SKIP_EMPTY) != 0u && !lsp_may_skip_empty(scene, s))
-    q.flags &= ~LSP_TRACE_SKIP_EMPTY;
   lsp_begin(scene, s, q);
   bool going = lsp_walk.ref != LSP_NONE;
   while (going) {
