@@ -448,8 +448,6 @@ types:
         value: (value & 0x1000) != 0
       is_symmetric:
         value: (value & 0x2000) != 0
-      is_conservative:
-        value: (value & 0x4000) != 0
       shaft_count:
         value: '(is_symmetric ? 15 : 30) * resolution * resolution * resolution * resolution'
   bit_words:

@@ -33,13 +33,6 @@ class Collector {
   void geometry(format::RuleId rule, const char* mutation, const std::function<void(Image&)>& change) {
     image(rule, mutation, change, {"--level", "geometry"});
   }
-  // A scene with conservative Line Spaces of one word, less the bit of a shaft: all else is as it was.
-  void empty_shaft(Image image, const char* mutation) {
-    LspLineSpace& space = image.line_spaces[0];
-    image.bit_words[space.word_first].bits &= ~1u;
-    space.filled -= 1;
-    add(format::RuleId::kShaftNotEmpty, mutation, encode(image), {"--level", "geometry"});
-  }
   void ntree(format::RuleId rule, const char* mutation, const std::function<void(Image&)>& change,
              std::vector<std::string> arguments = {}) {
     Image image = full_ntree_scene();

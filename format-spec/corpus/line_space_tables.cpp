@@ -38,15 +38,14 @@ double intersect(const Vec& origin, const Vec& direction, const LspTriangle& t) 
   return u >= 0 && v >= 0 && u + v <= 1 && distance >= 0 && distance <= 1 ? distance : INFINITY;
 }
 
-// Where a patch is: its point with these coordinates on it, 0 to 1.
-Vec patch_point(const LspLineSpace& space, uint32_t n, uint32_t face, uint32_t patch, double at) {
+Vec patch_centre(const LspLineSpace& space, uint32_t n, uint32_t face, uint32_t patch) {
   const Vec lo = to_vec(space.lo), hi = to_vec(space.hi);
   const int axis = static_cast<int>(face / 2);
   double point[3] = {};
   const int u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;
   point[axis] = face % 2 == 0 ? lo[axis] : hi[axis];
-  point[u] = lo[u] + (hi[u] - lo[u]) * (patch % n + at) / n;
-  point[v] = lo[v] + (hi[v] - lo[v]) * (patch / n + at) / n;
+  point[u] = lo[u] + (hi[u] - lo[u]) * (patch % n + 0.5) / n;
+  point[v] = lo[v] + (hi[v] - lo[v]) * (patch / n + 0.5) / n;
   return {point[0], point[1], point[2]};
 }
 
@@ -61,26 +60,6 @@ uint32_t nearest(const Image& image, const LspLineSpace& space, const Vec& from,
     }
   }
   return best;
-}
-
-// Whether no triangle of the Line Space lies near the box around two patches. A triangle that reaches outside
-// the Line Space's box may lie near any line, as far as this looks.
-bool plainly_empty(const Image& image, const LspLineSpace& space, const Box& patches) {
-  const auto apart = [](const lsp_float3& lo, const lsp_float3& hi, const Box& other, float by) {
-    return lo.x > other.hi.x + by || lo.y > other.hi.y + by || lo.z > other.hi.z + by ||
-           hi.x < other.lo.x - by || hi.y < other.lo.y - by || hi.z < other.lo.z - by;
-  };
-  constexpr float kFar = 0.001f;  // more than a hundred times the margin of scenes as small as these
-  for (uint32_t i = 0; i < space.triangle_count; ++i) {
-    const LspTriangle& t = image.triangles[space.triangle_first + i];
-    Box box = Box::nothing();
-    for (const lsp_float3* v : {&t.v0, &t.v1, &t.v2}) box.add(*v);
-    const bool inside = box.lo.x > space.lo.x + kFar && box.lo.y > space.lo.y + kFar &&
-                        box.lo.z > space.lo.z + kFar && box.hi.x < space.hi.x - kFar &&
-                        box.hi.y < space.hi.y - kFar && box.hi.z < space.hi.z - kFar;
-    if (!inside || !apart(box.lo, box.hi, patches, kFar)) return false;
-  }
-  return true;
 }
 
 }  // namespace
@@ -107,8 +86,7 @@ void LineSpaceTables::fill(Image& image, uint32_t index, uint32_t child, const B
   space.child = child;
   const bool symmetric = options_.entry_bytes == 0 && !options_.directed;
   space.format = n | options_.entry_bytes << LSP_FORMAT_ENTRY_SHIFT |
-                 (options_.dense ? LSP_FORMAT_DENSE : 0) | (symmetric ? LSP_FORMAT_SYMMETRIC : 0) |
-                 (options_.conservative ? LSP_FORMAT_CONSERVATIVE : 0);
+                 (options_.dense ? LSP_FORMAT_DENSE : 0) | (symmetric ? LSP_FORMAT_SYMMETRIC : 0);
 
   std::vector<uint32_t> shafts(format::shape_of(space.format).shafts, LSP_NONE);
   for (uint32_t in = 0; in < 6; ++in)
@@ -119,14 +97,7 @@ void LineSpaceTables::fill(Image& image, uint32_t index, uint32_t child, const B
           const uint32_t shaft =
               symmetric ? LSP_SHAFT_INDEX_SYMMETRIC(in, out, p, q, n) : LSP_SHAFT_INDEX(in, out, p, q, n);
           shafts[shaft] =
-              nearest(image, space, patch_point(space, n, in, p, 0.5), patch_point(space, n, out, q, 0.5));
-          if (!options_.conservative || shafts[shaft] != LSP_NONE) continue;
-          Box patches = Box::nothing();
-          for (double at : {0.0, 1.0}) {
-            patches.add(to_float3(patch_point(space, n, in, p, at)));
-            patches.add(to_float3(patch_point(space, n, out, q, at)));
-          }
-          shafts[shaft] = plainly_empty(image, space, patches) ? LSP_NONE : 0;
+              nearest(image, space, patch_centre(space, n, in, p), patch_centre(space, n, out, q));
         }
     }
   for (uint32_t entry : shafts) space.filled += entry != LSP_NONE;

@@ -18,8 +18,7 @@ struct LineSpaceOptions {
   uint32_t resolution = 0;   // N; 0: no Line Spaces
   uint32_t entry_bytes = 1;  // 0 makes them binary and symmetric
   bool dense = false;
-  bool directed = false;      // binary, but each direction of a shaft has a bit of its own
-  bool conservative = false;  // binary; a shaft is empty only where that is plain to see
+  bool directed = false;  // binary, but each direction of a shaft has a bit of its own
 };
 
 class LineSpaceTables {

@@ -246,8 +246,6 @@ void line_spaces(Collector& c) {
           [](Image& i) { i.line_spaces[1].triangle_count += 1; });
   c.image(RuleId::kBinaryFeature, "the feature bit BINARY is set",
           [](Image& i) { i.header.required_features |= LSP_FEATURE_BINARY; });
-  c.image(RuleId::kConservativeFormat, "CONSERVATIVE of Line Space 0, which has candidates, is set",
-          [](Image& i) { i.line_spaces[0].format |= LSP_FORMAT_CONSERVATIVE; });
   c.image(RuleId::kLineSpaceBox, "the box of Line Space 0 is flat",
           [](Image& i) { i.line_spaces[0].hi.y = i.line_spaces[0].lo.y; });
 }
@@ -330,8 +328,6 @@ void geometry(Collector& c) {
   });
   c.geometry(RuleId::kLineSpaceScale, "scale.y of Line Space 0 is doubled",
              [](Image& i) { i.line_spaces[0].scale.y *= 2; });
-  c.empty_shaft(box_on_floor({.resolution = 1, .entry_bytes = 0, .conservative = true}),
-                "the bit of shaft 0 of a conservative Line Space is clear, which runs along its triangles");
 }
 
 void metadata_and_source(Collector& c) {

@@ -152,9 +152,6 @@ void geometry(Collector& c) {
     i.cells.back().count -= 1;
     i.header.max_steps -= 1;
   });
-  c.empty_shaft(
-      ntree_scene({.resolution = 1, .depths = {1}, .entry_bytes = 0, .conservative = true}),
-      "the bit of shaft 0 of a cell's conservative Line Space is clear, which runs along its triangles");
 }
 
 }  // namespace

@@ -70,9 +70,7 @@ class Builder {
 
  private:
   LineSpaceOptions table_options() const {
-    return {.resolution = options_.resolution,
-            .entry_bytes = options_.entry_bytes,
-            .conservative = options_.conservative};
+    return {.resolution = options_.resolution, .entry_bytes = options_.entry_bytes};
   }
 
   void header() {

@@ -15,7 +15,6 @@ struct NtreeOptions {
   std::vector<uint32_t> depths = {
       1};                    // cells of these levels carry one where it has a filled shaft; 0 is the root
   uint32_t entry_bytes = 1;  // 0 makes binary, symmetric Line Spaces
-  bool conservative = false;
   bool normals = false;
   bool materials = false;
   bool exact = true;  // false: what is below terminal Line Spaces is left out

@@ -19,8 +19,7 @@ class Builder {
   Builder(std::vector<LspTriangle> triangles, const SceneOptions& options)
       : options_(options),
         input_(std::move(triangles)),
-        tables_({options.resolution, options.entry_bytes, options.dense, options.directed,
-                 options.conservative}) {}
+        tables_({options.resolution, options.entry_bytes, options.dense, options.directed}) {}
 
   Image run() {
     Box bounds = Box::nothing();
@@ -177,6 +176,12 @@ Bytes packed(const Image& image) {
 
 // What a writer of a later minor version might add: an unknown optional feature and an unknown optional
 // section.
+Image retired_format() {
+  Image image = box_on_floor({.resolution = 1, .depths = {2}, .entry_bytes = 0, .exact = false});
+  for (LspLineSpace& space : image.line_spaces) space.format |= LSP_FORMAT_RETIRED;
+  return image;
+}
+
 Bytes newer_minor() {
   Sections sections = to_sections(box_on_floor({}));
   sections.header.version_minor = 9;
@@ -233,10 +238,8 @@ std::vector<ValidFile> valid_files() {
       encode(box_on_floor({.resolution = 2, .entry_bytes = 0})));
   add("binary-directed", "binary Line Spaces with a bit for each direction of a shaft",
       encode(box_on_floor({.resolution = 2, .entry_bytes = 0, .directed = true})));
-  add("binary-conservative", "binary Line Spaces whose clear bits would be proofs",
-      encode(box_on_floor({.resolution = 1, .entry_bytes = 0, .conservative = true})));
-  add("conservative", "conservative Line Spaces with clear bits, a bit for each direction of a shaft",
-      encode(box_on_floor({.resolution = 4, .entry_bytes = 0, .directed = true, .conservative = true})));
+  add("retired-format", "bit 14 of a Line Space's format, which 2.0 and 2.1 knew, is ignored",
+      encode(retired_format()));
   add("root-line-space", "the root carries a Line Space",
       encode(box_on_floor({.resolution = 1, .depths = {0}})));
   add("approximate", "no exact tree: subtrees below terminal Line Spaces are left out",
@@ -258,8 +261,6 @@ std::vector<ValidFile> valid_files() {
       encode(ntree_scene({.resolution = 1, .depths = {0}, .exact = false})));
   add("ntree-binary", "an NTree with binary Line Spaces",
       encode(ntree_scene({.resolution = 2, .depths = {1}, .entry_bytes = 0})));
-  add("ntree-conservative", "an NTree with conservative Line Spaces, the root's with clear bits",
-      encode(ntree_scene({.resolution = 4, .depths = {0, 1}, .entry_bytes = 0, .conservative = true})));
   add("ntree-empty", "an NTree without geometry", encode(empty_ntree_scene()));
   add("ntree-packed", "an NTree, every section packed", packed(full_ntree_scene()));
   add("align-4096", "sections at multiples of 4096", encode(with_alignment(full_scene(), 4096)));

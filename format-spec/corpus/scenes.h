@@ -15,7 +15,6 @@ struct SceneOptions {
   uint32_t entry_bytes = 1;            // 0 makes binary, symmetric Line Spaces
   bool dense = false;
   bool directed = false;  // of binary ones: a bit a direction
-  bool conservative = false;
   bool normals = false;
   bool materials = false;
   bool exact = true;  // false: subtrees below terminal Line Spaces are left out

@@ -22,19 +22,6 @@ bool cells_sound(const Report& report) {
   return true;
 }
 
-// And the triangles of every node be in one piece, and the bits of every Line Space be its own.
-bool shafts_sound(const FileView& view, const Report& report) {
-  if (!view.part(Kind::kBits).usable || !view.part(Kind::kLspc).usable || !view.part(Kind::kTria).usable)
-    return false;
-  for (RuleId id :
-       {RuleId::kUnreachable, RuleId::kNotDepthFirst, RuleId::kLeafOutOfRange, RuleId::kLeafOrder,
-        RuleId::kTrianglesUnused, RuleId::kRootReference, RuleId::kLineSpaceOutOfRange,
-        RuleId::kLineSpaceUsedTwice, RuleId::kLineSpaceResolution, RuleId::kEntryBytes, RuleId::kFormatBits,
-        RuleId::kLineSpaceBox, RuleId::kWordsNotCumulative, RuleId::kWordsOutside, RuleId::kBoundsNotFinite})
-    if (report.has(id)) return false;
-  return (view.header.required_features & LSP_FEATURE_EXACT) != 0;
-}
-
 bool usable_or_absent(const FileView& view, Kind kind) {
   const Part& part = view.part(kind);
   return part.usable || (!part.present && declared_count(view.header, kind).value_or(0) == 0);
@@ -79,7 +66,6 @@ Report check_file(std::span<const std::byte> bytes, const CheckOptions& options)
   if (tree && tree_sound(report)) {
     check_geometry(view, report);
     if (ntree && cells_sound(report)) check_ntree_geometry(view, report);
-    if ((!ntree || cells_sound(report)) && shafts_sound(view, report)) check_conservative(view, report);
   }
   return report;
 }

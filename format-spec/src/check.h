@@ -3,14 +3,8 @@
 // The bytes may be hostile. No count, offset or size of the file is used before it was checked against the
 // bytes that are there; memory used beyond the file is at most `memory_limit` for unpacked sections, some 30
 // bytes a node of a damaged tree, some 20 bytes a triangle of an NTree and, at the level geometry, some 30
-// bytes a triangle and a node of an NTree, with conservative Line Spaces some 16 bytes a node and a Line
-// Space and four a triangle or reference more; four to 32 bytes a cell of a grid of cells. Nothing is
-// written, no thread is started.
-//
-// Time is proportional to the file's size. Proving the clear bits of conservative Line Spaces takes far
-// longer than all the rest, some 0.1 us a shaft where they are right, and ends after some ten seconds at most
-// (on a core of 2026): of a file that asks for more a part of the bits is looked at, spread over all Line
-// Spaces and the same in every run.
+// bytes a triangle and a node of an NTree; four to 32 bytes a cell of a grid of cells. Nothing is written, no
+// thread is started. Time is proportional to the file's size.
 #pragma once
 
 #include <cstddef>

@@ -99,7 +99,7 @@ class LineSpaceCheck {
   bool check_format(uint64_t i, const LineSpaceShape& shape) {
     const uint32_t format = spaces_[i].format;
     constexpr uint32_t kKnown = LSP_FORMAT_RESOLUTION_MASK | LSP_FORMAT_ENTRY_MASK << LSP_FORMAT_ENTRY_SHIFT |
-                                LSP_FORMAT_DENSE | LSP_FORMAT_SYMMETRIC | LSP_FORMAT_CONSERVATIVE;
+                                LSP_FORMAT_DENSE | LSP_FORMAT_SYMMETRIC | LSP_FORMAT_RETIRED;
     bool sound = true;
     if (shape.resolution == 0 || shape.resolution > LSP_MAX_RESOLUTION) {
       find(i, RuleId::kLineSpaceResolution, kFormat, "the resolution is " + std::to_string(shape.resolution));
@@ -118,9 +118,6 @@ class LineSpaceCheck {
       find(i, RuleId::kFormatBits, kFormat, "an unknown bit is set");
       sound = false;
     }
-    if ((format & LSP_FORMAT_CONSERVATIVE) && bytes != 0)
-      find(i, RuleId::kConservativeFormat, kFormat,
-           "CONSERVATIVE is set, but there are " + std::to_string(bytes) + " bytes an entry");
     return sound;
   }
 

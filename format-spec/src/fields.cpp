@@ -258,8 +258,7 @@ std::string line_space_text(uint32_t value) {
 std::string format_text(uint32_t value) {
   const LineSpaceShape shape = shape_of(value);
   return "N " + std::to_string(shape.resolution) + ", " + std::to_string(shape.entry_bytes) +
-         " bytes an entry" + (shape.dense ? ", dense" : "") + (shape.symmetric ? ", symmetric" : "") +
-         (value & LSP_FORMAT_CONSERVATIVE ? ", conservative" : "");
+         " bytes an entry" + (shape.dense ? ", dense" : "") + (shape.symmetric ? ", symmetric" : "");
 }
 
 std::string uint_text(std::string_view name, uint32_t value, bool ntree) {

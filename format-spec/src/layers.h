@@ -32,8 +32,6 @@ void check_line_spaces(const FileView& view, Report& report);
 void check_geometry(const FileView& view, Report& report);
 // Needs the same of an NTree, and GRID in order.
 void check_ntree_geometry(const FileView& view, Report& report);
-// Of either base structure, exact: needs leaves in order, and Line Spaces with words of their own.
-void check_conservative(const FileView& view, Report& report);
 
 // Needs every section of cells to be usable, and a grid in range.
 void check_cells(const FileView& view, Report& report);

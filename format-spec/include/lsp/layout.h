@@ -37,7 +37,7 @@ typedef struct lsp_float3 {
 
 /* Version of the format (not of the programs). A reader refuses another major version. */
 #define LSP_VERSION_MAJOR 2u
-#define LSP_VERSION_MINOR 1u
+#define LSP_VERSION_MINOR 2u
 
 /* First eight bytes: 89 'L' 'S' 'P' 0D 0A 1A 0A, as two little-endian words. Catches text-mode transfers. */
 #define LSP_MAGIC_0 0x50534C89u
@@ -64,7 +64,7 @@ typedef struct lsp_float3 {
 #ifndef GL_core_profile
 /* The minor version to write: the lowest that knows these required features. */
 static inline uint32_t lsp_version_minor(uint32_t required_features) {
-  return (required_features & LSP_FEATURE_COVERAGE) != 0 ? LSP_VERSION_MINOR : 0u;
+  return (required_features & LSP_FEATURE_COVERAGE) != 0 ? 1u : 0u;
 }
 
 /* Section types, LSP_SECTION_NODE and so on: four characters each, the first in the low byte. */
@@ -105,7 +105,7 @@ enum {
 #define LSP_FORMAT_ENTRY_MASK 0xFu
 #define LSP_FORMAT_DENSE 0x1000u     /* one entry per shaft, all ones meaning empty; no bit words */
 #define LSP_FORMAT_SYMMETRIC 0x2000u /* both directions of a shaft share one bit: 15 N^4 bits */
-#define LSP_FORMAT_CONSERVATIVE 0x4000u /* a clear bit proves the shaft empty */
+#define LSP_FORMAT_RETIRED 0x4000u   /* CONSERVATIVE of 2.0 and 2.1: ignored, written as zero */
 
 #define LSP_MAX_RESOLUTION 32u
 #define LSP_MAX_STACK 96u
