@@ -181,6 +181,7 @@ std::unique_ptr<GltfDocument> read_gltf_document(const std::filesystem::path& pa
     for (std::string& part : unread_parts(document)) out->notes.push_back(std::move(part));
     read_buffers(path, document, container.binary, *out, budget);
     reduced = reduce_to_geometry(out->file, document).dump(-1, ' ', false, json::error_handler_t::replace);
+    if (document.contains("animations")) out->animations = std::move(document["animations"]);
     for (const char* key : {"materials", "textures", "images", "samplers"}) {
       if (document.contains(key)) out->looks[key] = std::move(document[key]);
     }

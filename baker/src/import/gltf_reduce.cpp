@@ -196,9 +196,6 @@ std::vector<std::string> unread_parts(const json& document) {
   std::vector<std::string> parts;
   for (const std::string& name : extensions) parts.push_back("the extension " + name + " is not read");
   for (const std::string& name : attributes) parts.push_back("the vertex attribute " + name + " is not read");
-  if (!member(document, "animations").empty()) {
-    parts.push_back("its animations are not played, the mesh is taken at rest");
-  }
   if (member(document, "scenes").size() > 1 && !member(document, "scene").is_null()) {
     parts.push_back("only the default one of its scenes is read");
   }
