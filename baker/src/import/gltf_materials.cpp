@@ -144,12 +144,12 @@ TextureUse GltfMaterials::texture(const json& info, const AlphaRule& rule) {
 std::string GltfMaterials::picture_bytes(const json& image) {
   if (const std::string uri = text_member(image, "uri"); !uri.empty()) {
     if (is_data_uri(uri)) return decode_data_uri(document_.file, uri);
-    bool odd = false;
-    const std::filesystem::path path = resolve_uri(path_, uri, odd);
+    std::string remark;
+    const std::filesystem::path path = resolve_uri(path_, uri, remark);
     std::string bytes = read_file(path, builder_.budget());
     builder_.budget().release(bytes.size());
     builder_.add_source(path);
-    if (odd) note("the URI " + uri + " is no valid one, it is read as a path");
+    if (!remark.empty()) note(remark);
     return bytes;
   }
   const int64_t view = index_member(image, "bufferView");

@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include "import/find_file.h"
 #include "import/mtl.h"
 #include "import/mtl_textures.h"
 #include "import/polygons.h"
@@ -154,36 +155,32 @@ class ObjReader {
   }
 
   // Reads the library `name`, if there is a file by that name.
-  bool try_library(std::string name, std::map<std::string, MtlMaterial>& materials) {
+  bool try_library(const std::string& name, std::map<std::string, MtlMaterial>& materials) {
     // A hostile line may name the same large file thousands of times.
     constexpr size_t kMaxTries = 1000;
     if (++libraries_tried_ > kMaxTries) return true;
-    std::replace(name.begin(), name.end(), '\\', '/');
-    // Exporters write the path on their own machine; the file itself is usually beside the mesh.
-    for (const auto& path :
-         {path_.parent_path() / name, path_.parent_path() / std::filesystem::path(name).filename()}) {
-      std::error_code error;
-      if (!std::filesystem::is_regular_file(path, error)) continue;
-      std::set<std::string> notes;
-      std::map<std::string, MtlMaterial> found;
-      read_mtl(path, builder_.budget(), found, notes);
-      builder_.add_source(path);
-      for (const std::string& note : notes) builder_.note(path.string() + ": " + note);
-      for (auto& [material, entry] : found) {
-        entry.folder = path.parent_path();
-        materials.try_emplace(material, std::move(entry));
-      }
-      return true;
+    bool guessed = false;
+    const std::filesystem::path path = find_file(path_.parent_path(), name, guessed);
+    if (path.empty()) return false;
+    if (guessed) builder_.note(file_ + ": the material library " + name + " is read from " + path.string());
+    std::set<std::string> notes;
+    std::map<std::string, MtlMaterial> found;
+    read_mtl(path, builder_.budget(), found, notes);
+    builder_.add_source(path);
+    for (const std::string& note : notes) builder_.note(path.string() + ": " + note);
+    for (auto& [material, entry] : found) {
+      entry.folder = path.parent_path();
+      materials.try_emplace(material, std::move(entry));
     }
-    return false;
+    return true;
   }
 
   // A mtllib line names one file, which may hold spaces, or several.
   void read_libraries(const std::string& words, std::map<std::string, MtlMaterial>& materials) {
-    if (words.empty() || words.find('\0') != words.npos || try_library(words, materials)) return;
+    if (words.empty() || try_library(std::string(unquoted(words)), materials)) return;
     std::string_view rest = words, word;
     while (take_word(rest, word)) {
-      if (!try_library(std::string(word), materials)) {
+      if (!try_library(std::string(unquoted(word)), materials)) {
         builder_.note(file_ + ": the material library " + std::string(word) + " is not there");
       }
     }
