@@ -48,7 +48,7 @@ class ObjReader {
       builder_.note(file_ + ": " + std::to_string(other_elements_) +
                     " lines, points, curves or surfaces hold no triangle");
     }
-    make_colors_linear();
+    soup_.make_colors_linear();
     add_polygons(file_, soup_, builder_);
   }
 
@@ -106,18 +106,8 @@ class ObjReader {
     for (; count < 3 && take_word(line, word); ++count) color[count] = float(number_of(word));
     const bool given = count == 3 && std::isfinite(color.x + color.y + color.z);
     if (!given && soup_.colors.empty()) return;
-    while (soup_.colors.size() + 1 < soup_.positions.size()) push(soup_.colors, glm::vec3(1));
-    push(soup_.colors, given ? color : glm::vec3(1));
-    if (given) largest_color_ = std::max(largest_color_, std::max(color.x, std::max(color.y, color.z)));
-  }
-
-  // They are on the sRGB curve, from 0 to 1 or to 255.
-  void make_colors_linear() {
-    const double scale = largest_color_ > 1 ? 255 : 1;
-    for (glm::vec3& color : soup_.colors) {
-      for (int k = 0; k < 3; ++k)
-        color[k] = float(linear_of_srgb(std::clamp(double(color[k]) / scale, 0.0, 1.0)));
-    }
+    while (soup_.colors.size() + 1 < soup_.positions.size()) push(soup_.colors, kNoColor);
+    push(soup_.colors, given ? color : kNoColor);
   }
 
   void read_face(std::string_view line) {
@@ -227,7 +217,6 @@ class ObjReader {
   std::vector<std::string> libraries_;
   size_t libraries_tried_ = 0;
   uint64_t other_elements_ = 0;
-  float largest_color_ = 0;
 };
 
 }  // namespace
