@@ -158,6 +158,17 @@ void make_integers(const std::string& file, std::string_view key, json& value) {
   }
 }
 
+// The extensions that objects have anywhere: files use some that they do not declare.
+void collect_extensions(const json& value, std::set<std::string>& names) {
+  if (const json& own = member(value, "extensions"); own.is_object()) {
+    for (const auto& [name, item] : own.items()) names.insert(name);
+  }
+  if (!value.is_structured()) return;
+  for (const auto& [key, item] : value.items()) {
+    if (key != "extras") collect_extensions(item, names);
+  }
+}
+
 }  // namespace
 
 json reduce_to_geometry(const std::string& file, const json& document) {
@@ -169,11 +180,10 @@ json reduce_to_geometry(const std::string& file, const json& document) {
 std::vector<std::string> unread_parts(const json& document) {
   std::set<std::string> extensions, attributes;
   if (const json& used = member(document, "extensionsUsed"); used.is_array()) {
-    for (const json& item : used) {
-      const std::string name = item.is_string() ? item.get<std::string>() : "";
-      if (std::find(std::begin(kRead), std::end(kRead), name) == std::end(kRead)) extensions.insert(name);
-    }
+    for (const json& item : used) extensions.insert(item.is_string() ? item.get<std::string>() : "");
   }
+  collect_extensions(document, extensions);
+  for (const std::string_view read : kRead) extensions.erase(std::string(read));
   const auto collect = [&](const json& list) {
     if (!list.is_object()) return;
     for (const auto& [name, accessor] : list.items()) {
