@@ -1,4 +1,6 @@
 // Scenes posed at a time of an animation.
+#include <meshoptimizer.h>
+
 #include <cmath>
 
 #include "gltf_builder.h"
@@ -152,6 +154,20 @@ TEST_F(GltfAnimation, SparseKeysAreRead) {
       {"values", {{"bufferView", document_.view(value)}}}};
   channel(0, "translation", {0, 1}, sparse);
   expect_corner(at(0.5), 0, {3, 0, 0});
+}
+
+TEST_F(GltfAnimation, CompressedKeysAreRead) {
+  const std::vector<float> keys = {0, 0, 0, 8, 0, 0};
+  std::string packed(meshopt_encodeVertexBufferBound(2, 12), '\0');
+  packed.resize(meshopt_encodeVertexBuffer(reinterpret_cast<uint8_t*>(packed.data()), packed.size(),
+                                           keys.data(), 2, 12));
+  const int view = document_.view(packed);
+  json& source = document_.root["bufferViews"][size_t(view)];
+  json extension = source;
+  extension.update({{"byteStride", 12}, {"count", 2}, {"mode", "ATTRIBUTES"}});
+  source["extensions"]["EXT_meshopt_compression"] = extension;
+  channel(0, "translation", {0, 1}, document_.accessor(view, kFloat, 2, "VEC3"));
+  expect_corner(at(0.25), 0, {2, 0, 0});
 }
 
 TEST_F(GltfAnimation, TheAnimationIsChosenByNameOrNumber) {

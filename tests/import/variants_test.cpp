@@ -157,6 +157,15 @@ TEST_F(Variants, MtlColoursThatAreNoneAndFacesWithoutCoordinatesAreNoted) {
       has_note(import("a.obj", obj + "f 1/9 2/9 3/9\n"), "have a texture and no texture coordinates"));
 }
 
+TEST_F(Variants, AMapOfOpacityPlacedOtherwiseIsNoted) {
+  write("red.png", rgba_png(1, 1, {255, 0, 0, 255}));
+  const std::string obj = "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n";
+  write("a.mtl", "newmtl m\nmap_Kd red.png\nmap_d -imfchan r red.png\n");
+  EXPECT_TRUE(import("a.obj", obj).notes.empty());
+  write("a.mtl", "newmtl m\nmap_Kd red.png\nmap_d -s 2 2 2 -imfchan r red.png\n");
+  EXPECT_TRUE(has_note(import("a.obj", obj), "a map_d is placed as the map_Kd beside it"));
+}
+
 TEST_F(Variants, GltfExtensionsThatNoListDeclaresAreNoted) {
   Document document;
   document.node(
@@ -168,6 +177,13 @@ TEST_F(Variants, GltfExtensionsThatNoListDeclaresAreNoted) {
   const Mesh mesh = import("a.gltf", document.gltf());
   EXPECT_EQ(mesh.notes.size(), 1u);
   EXPECT_TRUE(has_note(mesh, "the extension KHR_materials_transmission is not read"));
+  document.root["materials"][0] = {{"alphaMode", "GLASS"}};
+  document.root["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = {
+      {"TRANSLATION", document.vec3({0, 0, 1})}, {"_COLOR", document.vec3({1, 0, 0})}};
+  const Mesh odd = import("a.gltf", document.gltf());
+  EXPECT_EQ(odd.notes.size(), 2u);
+  EXPECT_TRUE(has_note(odd, "the attribute _COLOR of instances is not read"));
+  EXPECT_TRUE(has_note(odd, "the alphaMode GLASS is not known, OPAQUE is taken for it"));
 }
 
 }  // namespace

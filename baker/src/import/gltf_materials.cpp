@@ -81,6 +81,8 @@ GltfMaterials::Entry GltfMaterials::read(const json& source, uint32_t known_id) 
   AlphaRule alpha;
   const std::string mode = text_member(source, "alphaMode");
   alpha.mode = mode == "MASK" ? AlphaMode::kMask : mode == "BLEND" ? AlphaMode::kBlend : AlphaMode::kOpaque;
+  if (alpha.mode == AlphaMode::kOpaque && !mode.empty() && mode != "OPAQUE")
+    note("the alphaMode " + mode + " is not known, OPAQUE is taken for it");
   alpha.factor = factor[3];
   alpha.cutoff = float(number_member(source, "alphaCutoff", 0.5));
   material.base_color = {factor[0], factor[1], factor[2]};

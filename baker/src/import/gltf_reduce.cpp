@@ -203,9 +203,21 @@ std::vector<std::string> unread_parts(const json& document) {
       }
     }
   }
+  std::set<std::string> instanced;
+  if (const json& nodes = member(document, "nodes"); nodes.is_array()) {
+    for (const json& node : nodes) {
+      const json& list = member(member(member(node, "extensions"), "EXT_mesh_gpu_instancing"), "attributes");
+      if (!list.is_object()) continue;
+      for (const auto& [name, accessor] : list.items()) {
+        if (name != "TRANSLATION" && name != "ROTATION" && name != "SCALE") instanced.insert(name);
+      }
+    }
+  }
   std::vector<std::string> parts;
   for (const std::string& name : extensions) parts.push_back("the extension " + name + " is not read");
   for (const std::string& name : attributes) parts.push_back("the vertex attribute " + name + " is not read");
+  for (const std::string& name : instanced)
+    parts.push_back("the attribute " + name + " of instances is not read");
   if (member(document, "scenes").size() > 1 && !member(document, "scene").is_null()) {
     parts.push_back("only the default one of its scenes is read");
   }

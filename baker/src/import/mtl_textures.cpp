@@ -69,6 +69,9 @@ uint32_t MtlTextures::add(const MtlMaterial& source, std::map<uint32_t, Surface>
       const uint64_t texels =
           uint64_t{std::max(color.width, opacity.width)} * std::max(color.height, opacity.height);
       builder_.budget().charge(file_, texels, 4);
+      const MtlMap &a = source.color, &b = source.opacity;
+      if (!color.rgba.empty() && (a.scale != b.scale || a.offset != b.offset || a.clamp != b.clamp))
+        builder_.note(file_ + ": a map_d is placed as the map_Kd beside it, its own options are not read");
       color = with_alpha(color, opacity, source.opacity.channel);
     }
     base->second =
