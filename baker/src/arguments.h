@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -35,6 +36,8 @@ struct Arguments {
   float plane_tolerance = 0.0f;
   uint32_t samples = 5;
   float crease_angle = 40;
+  std::optional<double> time;  // of an animation, none: at rest
+  std::string animation;
   bool no_splits = false;
   std::string preset = "balanced";
   double max_error = 0;  // per cent of rays, 0: not asked for

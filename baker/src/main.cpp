@@ -68,6 +68,8 @@ Exit run(Arguments a) {
   ImportOptions import_options;
   import_options.memory_limit = a.memory_limit;
   import_options.crease_angle_degrees = a.crease_angle;
+  import_options.time = a.time;
+  import_options.animation = a.animation;
   Mesh mesh = import_meshes(a.inputs, import_options);
   if (a.strict && !mesh.notes.empty()) refuse_notes(mesh);
   const auto source = hash_sources(mesh);
@@ -169,20 +171,29 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0.0f, 1e6f));
   app.add_option("--crease-angle", a.crease_angle, "Smooth normals are made up to this angle, in degrees")
       ->check(CLI::Range(0.0f, 180.0f));
+  auto* time = app.add_option("--time", a.time,
+                              "Pose glTF scenes at this time of an animation, in seconds; else they are at "
+                              "rest")
+                   ->check(CLI::Range(-1e9, 1e9));
+  app.add_option("--animation", a.animation,
+                 "With --time: the animation, by its name or its number from 0; else each file's first")
+      ->needs(time);
   app.add_flag("--strict", a.strict, "Refuse, with exit 3, an input that leads to any note");
   app.add_option("--depfile", a.depfile,
                  "Write a rule for Make and Ninja: OUT.lsp: every file that was read");
   app.add_flag("--no-splits", a.no_splits, "Build the tree without spatial splits");
   add_common_options(app, "lsp-bake", a.common);
-  arrange_help(app, "lsp-bake room.gltf -o room.lsp --preset fast",
-               {{"What most people need",
-                 {"INPUT", "--output FILE", "--preset", "--max-error PERCENT", "--for", "--compress"}},
-                {"Base structure", {"--base", "--cells", "--branching", "--levels", "--no-splits"}},
-                {"Line Spaces",
-                 {"--resolution", "--depth", "--triangles", "--samples", "--normal-angle DEGREES",
-                  "--plane-tolerance", "--no-line-spaces", "--exact", "--no-exact"}},
-                {"What is read", {"--crease-angle DEGREES", "--strict", "--depfile FILE"}},
-                {"The machine and the file", {"--threads", "--memory-limit", "--align"}}});
+  arrange_help(
+      app, "lsp-bake room.gltf -o room.lsp --preset fast",
+      {{"What most people need",
+        {"INPUT", "--output FILE", "--preset", "--max-error PERCENT", "--for", "--compress"}},
+       {"Base structure", {"--base", "--cells", "--branching", "--levels", "--no-splits"}},
+       {"Line Spaces",
+        {"--resolution", "--depth", "--triangles", "--samples", "--normal-angle DEGREES", "--plane-tolerance",
+         "--no-line-spaces", "--exact", "--no-exact"}},
+       {"What is read",
+        {"--time SECONDS", "--animation NAME", "--crease-angle DEGREES", "--strict", "--depfile FILE"}},
+       {"The machine and the file", {"--threads", "--memory-limit", "--align"}}});
   return run_program("lsp-bake", app, argc, argv, [&] {
     a.resolution_given = resolution->count() > 0;
     a.depth_given = depth->count() > 0;

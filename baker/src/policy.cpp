@@ -1,6 +1,7 @@
 #include "policy.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <map>
 
@@ -56,6 +57,8 @@ void check(const Arguments& a) {
                   "cells have tables of their own: leave out --base cells and --cells, or what is of Line "
                   "Spaces: --resolution, --depth, --samples, --triangles, --no-line-spaces, --normal-angle, "
                   "--plane-tolerance, --for visibility");
+  if (a.time && !std::isfinite(*a.time))
+    throw Failure(Exit::kUsage, "", "--time is no number of seconds, give one");
   if (ntree && a.max_error > 0)
     throw Failure(Exit::kUsage, "", "--max-error chooses among cells or BVHs: leave out --base ntree");
   if (a.no_line_spaces && a.no_exact)

@@ -144,6 +144,36 @@ TEST_F(LspBake, NotesAreInTheReportAndStrictRefusesThem) {
   EXPECT_FALSE(fs::exists(folder_ / "c.lsp"));
 }
 
+TEST_F(LspBake, AnAnimationsTimeIsInMeta) {
+  // A triangle that moves from z = 0 to 4 in two seconds.
+  std::ofstream(folder_ / "moves.gltf") << R"({"asset": {"version": "2.0"},
+    "buffers": [{"byteLength": 68, "uri": "data:application/octet-stream;base64,)"
+                                           R"(AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA)"
+                                           R"(AAAAAAAAAEAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAgEA="}],
+    "bufferViews": [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 8},
+                    {"buffer": 0, "byteOffset": 44, "byteLength": 24}],
+    "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
+                  {"bufferView": 1, "componentType": 5126, "count": 2, "type": "SCALAR"},
+                  {"bufferView": 2, "componentType": 5126, "count": 2, "type": "VEC3"}],
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}], "nodes": [{"mesh": 0}],
+    "animations": [{"name": "Rise", "samplers": [{"input": 1, "output": 2}],
+                    "channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}]}]})";
+  ASSERT_EQ(run("moves.gltf -o a.lsp --time 1.5 --strict"), 0) << read("err");
+  EXPECT_NE(read("a.lsp").find("\"time\":1.5,\"animation\":\"\""), std::string::npos);
+  ASSERT_EQ(run("moves.gltf -o b.lsp --animation Rise --time -1 --strict"), 0) << read("err");
+  EXPECT_NE(read("b.lsp").find("\"time\":-1.0,\"animation\":\"Rise\""), std::string::npos);
+  ASSERT_EQ(run("moves.gltf -o b.lsp"), 0);
+  EXPECT_EQ(read("b.lsp").find("\"time\""), std::string::npos);
+  EXPECT_EQ(run("moves.gltf -o c.lsp --time 1 --animation Fall"), 1);
+  EXPECT_NE(read("err").find("no input has the animation Fall, choose of 0 (Rise)"), std::string::npos)
+      << read("err");
+  EXPECT_EQ(run("grid.obj -o c.lsp --time 1"), 1);
+  EXPECT_EQ(run("moves.gltf -o c.lsp --animation Rise"), 1);
+  for (const char* time : {"nan", "inf", "soon"})
+    EXPECT_EQ(run(std::string("moves.gltf -o c.lsp --time ") + time), 1) << time;
+  EXPECT_FALSE(fs::exists(folder_ / "c.lsp"));
+}
+
 TEST_F(LspBake, EveryFileReadIsInTheHashAndTheDepfile) {
   fs::create_directory(folder_ / "my scene");
   std::ofstream(folder_ / "my scene/a.mtl") << "newmtl x\nKd 1 0 0\n";

@@ -25,9 +25,10 @@ class GltfReader {
         primitives_(*document_, accessors_, materials_, builder),
         skins_(*document_, accessors_) {}
 
-  void read() {
+  void read(PoseRequest& pose) {
     for (const std::string& note : document_->notes) builder_.note(document_->file + ": " + note);
     for (const std::filesystem::path& source : document_->sources) builder_.add_source(source);
+    pose_document(*document_, accessors_, pose, builder_);
     const std::vector<int> roots = find_roots();
     check_scene(roots);
     for (const int root : roots) walk(root);
@@ -247,6 +248,8 @@ class GltfReader {
 
 }  // namespace
 
-void read_gltf(const std::filesystem::path& path, MeshBuilder& builder) { GltfReader(path, builder).read(); }
+void read_gltf(const std::filesystem::path& path, MeshBuilder& builder, PoseRequest& pose) {
+  GltfReader(path, builder).read(pose);
+}
 
 }  // namespace lsp

@@ -161,10 +161,12 @@ Bytes GltfAccessors::decode_meshopt(int buffer_view, const tinygltf::Value& exte
 std::vector<float> GltfAccessors::floats(int index, int components) {
   const tinygltf::Accessor& accessor = at(index);
   const size_t component = size_of(accessor.componentType);
-  const int shape = components == 16 ? TINYGLTF_TYPE_MAT4 : components;
+  const int shape = components == 16  ? TINYGLTF_TYPE_MAT4
+                    : components == 1 ? TINYGLTF_TYPE_SCALAR
+                                      : components;
   if (accessor.type != shape || component == 0 ||
       accessor.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT) {
-    fail(document_, "has a vertex attribute of a type glTF does not permit for it");
+    fail(document_, "has vertex attributes or keys of a type glTF does not permit for them");
   }
   budget_.charge(document_.file, accessor.count, uint64_t(components) * sizeof(float));
   std::vector<float> values(accessor.count * size_t(components), 0.0f);

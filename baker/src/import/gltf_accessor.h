@@ -14,9 +14,10 @@ class GltfAccessors {
   // The accessor, or a Failure kInvalid where the index is out of range.
   const tinygltf::Accessor& at(int accessor) const;
 
-  // `components` floats an element (16: a matrix, by columns), count * components in all: quantised values
-  // are decoded, an accessor without a buffer view is zero, sparse values are laid over. kInvalid for another
-  // number of components, a component type glTF does not permit for vertices, or bytes outside the buffers.
+  // `components` floats an element (1: a scalar, 16: a matrix by columns), count * components in all:
+  // quantised values are decoded, an accessor without a buffer view is zero, sparse values are laid over.
+  // kInvalid for another number of components, a component type glTF does not permit for vertices, or bytes
+  // outside the buffers.
   std::vector<float> floats(int accessor, int components);
 
   // Unsigned scalars. kInvalid as above.

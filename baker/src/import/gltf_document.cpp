@@ -116,9 +116,9 @@ void check_version(const std::string& file, const json& document) {
 // The file by that URI, which from now on is one of the document's sources.
 std::filesystem::path resolve_file(const std::filesystem::path& path, const std::string& uri,
                                    GltfDocument& out) {
-  bool odd = false;
-  out.sources.push_back(resolve_uri(path, uri, odd));
-  if (odd) out.notes.push_back("the URI " + uri + " is no valid one, it is read as a path");
+  std::string remark;
+  out.sources.push_back(resolve_uri(path, uri, remark));
+  if (!remark.empty()) out.notes.push_back(remark);
   return out.sources.back();
 }
 
@@ -137,7 +137,7 @@ void read_buffers(const std::filesystem::path& path, const json& document, Bytes
     if (uri.is_string()) {
       const auto& text = uri.get_ref<const std::string&>();
       if (is_data_uri(text)) {
-        budget.charge(out.file, text.size());
+        budget.charge(out.file, text.size(), 2);
         out.storage.push_back(decode_data_uri(out.file, text));
       } else {
         out.storage.push_back(read_file(resolve_file(path, text, out), budget));
@@ -181,6 +181,7 @@ std::unique_ptr<GltfDocument> read_gltf_document(const std::filesystem::path& pa
     for (std::string& part : unread_parts(document)) out->notes.push_back(std::move(part));
     read_buffers(path, document, container.binary, *out, budget);
     reduced = reduce_to_geometry(out->file, document).dump(-1, ' ', false, json::error_handler_t::replace);
+    if (document.contains("animations")) out->animations = std::move(document["animations"]);
     for (const char* key : {"materials", "textures", "images", "samplers"}) {
       if (document.contains(key)) out->looks[key] = std::move(document[key]);
     }

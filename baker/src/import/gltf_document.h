@@ -21,6 +21,7 @@ using Bytes = std::span<const uint8_t>;
 struct GltfDocument {
   std::string file;
   tinygltf::Model model;             // without materials, animations, cameras, extras; no buffer data
+  nlohmann::json animations;         // as they are, nothing checked
   nlohmann::json looks;              // materials, textures, images and samplers as they are, nothing checked
   std::vector<Bytes> buffers;        // by glTF index; empty where the file gives no bytes for it
   std::vector<std::string> storage;  // what `buffers` points into

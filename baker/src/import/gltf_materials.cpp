@@ -81,6 +81,8 @@ GltfMaterials::Entry GltfMaterials::read(const json& source, uint32_t known_id) 
   AlphaRule alpha;
   const std::string mode = text_member(source, "alphaMode");
   alpha.mode = mode == "MASK" ? AlphaMode::kMask : mode == "BLEND" ? AlphaMode::kBlend : AlphaMode::kOpaque;
+  if (alpha.mode == AlphaMode::kOpaque && !mode.empty() && mode != "OPAQUE")
+    note("the alphaMode " + mode + " is not known, OPAQUE is taken for it");
   alpha.factor = factor[3];
   alpha.cutoff = float(number_member(source, "alphaCutoff", 0.5));
   material.base_color = {factor[0], factor[1], factor[2]};
@@ -144,12 +146,12 @@ TextureUse GltfMaterials::texture(const json& info, const AlphaRule& rule) {
 std::string GltfMaterials::picture_bytes(const json& image) {
   if (const std::string uri = text_member(image, "uri"); !uri.empty()) {
     if (is_data_uri(uri)) return decode_data_uri(document_.file, uri);
-    bool odd = false;
-    const std::filesystem::path path = resolve_uri(path_, uri, odd);
+    std::string remark;
+    const std::filesystem::path path = resolve_uri(path_, uri, remark);
     std::string bytes = read_file(path, builder_.budget());
     builder_.budget().release(bytes.size());
     builder_.add_source(path);
-    if (odd) note("the URI " + uri + " is no valid one, it is read as a path");
+    if (!remark.empty()) note(remark);
     return bytes;
   }
   const int64_t view = index_member(image, "bufferView");

@@ -158,6 +158,17 @@ void make_integers(const std::string& file, std::string_view key, json& value) {
   }
 }
 
+// The extensions that objects have anywhere: files use some that they do not declare.
+void collect_extensions(const json& value, std::set<std::string>& names) {
+  if (const json& own = member(value, "extensions"); own.is_object()) {
+    for (const auto& [name, item] : own.items()) names.insert(name);
+  }
+  if (!value.is_structured()) return;
+  for (const auto& [key, item] : value.items()) {
+    if (key != "extras") collect_extensions(item, names);
+  }
+}
+
 }  // namespace
 
 json reduce_to_geometry(const std::string& file, const json& document) {
@@ -169,11 +180,10 @@ json reduce_to_geometry(const std::string& file, const json& document) {
 std::vector<std::string> unread_parts(const json& document) {
   std::set<std::string> extensions, attributes;
   if (const json& used = member(document, "extensionsUsed"); used.is_array()) {
-    for (const json& item : used) {
-      const std::string name = item.is_string() ? item.get<std::string>() : "";
-      if (std::find(std::begin(kRead), std::end(kRead), name) == std::end(kRead)) extensions.insert(name);
-    }
+    for (const json& item : used) extensions.insert(item.is_string() ? item.get<std::string>() : "");
   }
+  collect_extensions(document, extensions);
+  for (const std::string_view read : kRead) extensions.erase(std::string(read));
   const auto collect = [&](const json& list) {
     if (!list.is_object()) return;
     for (const auto& [name, accessor] : list.items()) {
@@ -193,12 +203,21 @@ std::vector<std::string> unread_parts(const json& document) {
       }
     }
   }
+  std::set<std::string> instanced;
+  if (const json& nodes = member(document, "nodes"); nodes.is_array()) {
+    for (const json& node : nodes) {
+      const json& list = member(member(member(node, "extensions"), "EXT_mesh_gpu_instancing"), "attributes");
+      if (!list.is_object()) continue;
+      for (const auto& [name, accessor] : list.items()) {
+        if (name != "TRANSLATION" && name != "ROTATION" && name != "SCALE") instanced.insert(name);
+      }
+    }
+  }
   std::vector<std::string> parts;
   for (const std::string& name : extensions) parts.push_back("the extension " + name + " is not read");
   for (const std::string& name : attributes) parts.push_back("the vertex attribute " + name + " is not read");
-  if (!member(document, "animations").empty()) {
-    parts.push_back("its animations are not played, the mesh is taken at rest");
-  }
+  for (const std::string& name : instanced)
+    parts.push_back("the attribute " + name + " of instances is not read");
   if (member(document, "scenes").size() > 1 && !member(document, "scene").is_null()) {
     parts.push_back("only the default one of its scenes is read");
   }

@@ -20,9 +20,9 @@ std::string extension_of(const std::filesystem::path& path) {
   return extension;
 }
 
-void read_mesh_file(const std::filesystem::path& path, MeshBuilder& builder) {
+void read_mesh_file(const std::filesystem::path& path, MeshBuilder& builder, PoseRequest& pose) {
   const std::string extension = extension_of(path);
-  if (extension == ".gltf" || extension == ".glb") return read_gltf(path, builder);
+  if (extension == ".gltf" || extension == ".glb") return read_gltf(path, builder, pose);
   if (extension == ".obj") return read_obj(path, builder);
   if (extension == ".ply") return read_ply(path, builder);
   if (extension == ".stl") return read_stl(path, builder);
@@ -31,17 +31,27 @@ void read_mesh_file(const std::filesystem::path& path, MeshBuilder& builder) {
                 "is of no format known here, give .gltf, .glb, .obj, .ply, .stl or .off");
 }
 
+// A time that moves nothing is a mistake.
+void check_pose(const PoseRequest& pose) {
+  if (!pose.seconds || pose.met) return;
+  if (pose.known.empty()) throw Failure(Exit::kUsage, "", "no input has an animation, leave out --time");
+  std::string names;
+  for (const std::string& name : pose.known) names += (names.empty() ? "" : ", ") + name;
+  throw Failure(Exit::kUsage, "", "no input has the animation " + pose.animation + ", choose of " + names);
+}
+
 }  // namespace
 
 Mesh import_meshes(std::span<const std::filesystem::path> inputs, const ImportOptions& options) {
   Budget budget(options.memory_limit);
   MeshBuilder builder(budget, options.crease_angle_degrees);
+  PoseRequest pose{options.time, options.animation, false, {}};
   for (const std::filesystem::path& path : inputs) {
     builder.begin_input(path);
     const uint64_t count_before = builder.mesh().primitive_count;
     const Rejected before = builder.mesh().rejected;
     try {
-      read_mesh_file(path, builder);
+      read_mesh_file(path, builder, pose);
     } catch (const std::bad_alloc&) {
       throw Failure(Exit::kLimit, path.string(), "needs more memory to import than there is, split the mesh");
     }
@@ -61,6 +71,7 @@ Mesh import_meshes(std::span<const std::filesystem::path> inputs, const ImportOp
       throw Failure(Exit::kInvalid, path.string(), why + ", repair or leave out the file");
     }
   }
+  check_pose(pose);
   return builder.take();
 }
 

@@ -4,7 +4,9 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <span>
+#include <string>
 
 #include "mesh.h"
 
@@ -16,6 +18,11 @@ struct ImportOptions {
   uint64_t memory_limit = 0;
   // Faces of a file without normals share a smooth normal at a corner where they meet at less than this.
   float crease_angle_degrees = 40;
+  // glTF scenes are posed at this time, in seconds, of the animation by that name or number (from 0; empty:
+  // each file's first). Before its first key and after its last a channel holds what these say. Files without
+  // the animation, and all where no time is given, are taken at rest.
+  std::optional<double> time = std::nullopt;
+  std::string animation = {};
 };
 
 // Reads the files in order into one mesh in world space (float32, the files' own units and axes).
@@ -31,9 +38,9 @@ struct ImportOptions {
 // Positions are welded exactly (-0 equals +0); positions no kept triangle uses are left out.
 //
 // The files may be hostile: every count, offset and index is checked before use, and memory is bounded.
-// Throws Failure: kFile (cannot be read), kInvalid (damaged, or a file without any triangle, or
-// without any that can be used), kUnsupported (a
-// format, version or required extension, by name), kLimit (memory, or more than 2^32 - 2 triangles).
+// Throws Failure: kUsage (no input has the animation asked for), kFile (cannot be read), kInvalid (damaged,
+// or a file without any triangle, or without any that can be used), kUnsupported (a format, version or
+// required extension, by name), kLimit (memory, or more than 2^32 - 2 triangles).
 Mesh import_meshes(std::span<const std::filesystem::path> inputs, const ImportOptions& options);
 
 // The hash that names a mesh's source: XXH3-128 (seed 0) of the concatenation of the bytes of all its sources

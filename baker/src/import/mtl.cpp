@@ -8,15 +8,17 @@
 namespace lsp {
 namespace {
 
-// "r g b", or one number for all three. Spectral curves and CIE colours ("spectral f.rfl", "xyz x y z") leave
-// the colour as it was.
-void read_color(std::string_view line, glm::vec3& color) {
+// "r g b", or one number for all three. False, with the colour as it was, for anything else: spectral curves
+// and CIE colours ("spectral f.rfl", "xyz x y z").
+bool read_color(std::string_view line, glm::vec3& color) {
   double value[3];
   int count = 0;
   for (std::string_view word; count < 3 && take_word(line, word); ++count) value[count] = number_of(word);
-  if (count == 0 || !std::isfinite(value[0])) return;
+  if (count == 0 || !std::isfinite(value[0])) return false;
   if (count < 3) value[1] = value[2] = value[0];
-  if (std::isfinite(value[1]) && std::isfinite(value[2])) color = glm::vec3(value[0], value[1], value[2]);
+  if (!std::isfinite(value[1]) || !std::isfinite(value[2])) return false;
+  color = glm::vec3(value[0], value[1], value[2]);
+  return true;
 }
 
 bool read_factor(std::string_view line, float& factor) {
@@ -62,7 +64,7 @@ MtlMap read_map(std::string_view line, std::set<std::string>& notes) {
       if (option == "-cc" && value == "on") notes.insert("the option -cc of a map is not read");
     }
   }
-  map.file = std::string(trim(line));
+  map.file = std::string(unquoted(trim(line)));
   return map;
 }
 
@@ -88,7 +90,8 @@ void read_mtl(const std::filesystem::path& path, Budget& budget,
   };
   while (take_line(rest, line)) {
     if (!take_word(line, word)) continue;
-    if (word == "newmtl") {
+    const auto is = [&](std::string_view keyword) { return equals_ignoring_case(word, keyword); };
+    if (is("newmtl")) {
       end_material();
       const std::string name(trim(line));
       budget.charge(path.string(), sizeof(MtlMaterial) + 64 + 2 * name.size());
@@ -100,29 +103,28 @@ void read_mtl(const std::filesystem::path& path, Budget& budget,
     }
     Material& material = entry->material;
     float factor = 0;
-    if (word == "Kd") {
-      read_color(line, material.base_color);
-      color_given = true;
-    } else if (word == "Ke") {
-      read_color(line, material.emission);
-      emission_given = true;
-    } else if (word == "d" && read_factor(line, factor)) {
+    if (is("Kd") || is("Ke")) {
+      const bool glow = is("Ke");
+      (glow ? emission_given : color_given) = true;
+      if (!read_color(line, glow ? material.emission : material.base_color))
+        notes.insert("a " + std::string(word) + " that is no three numbers is not read");
+    } else if (is("d") && read_factor(line, factor)) {
       material.opacity = factor;
       solid_given = true;
-    } else if (word == "Tr" && !solid_given && read_factor(line, factor)) {
+    } else if (is("Tr") && !solid_given && read_factor(line, factor)) {
       material.opacity = 1.0f - factor;
-    } else if (word == "Pr" && read_factor(line, factor)) {
+    } else if (is("Pr") && read_factor(line, factor)) {
       material.roughness = factor;
       rough_given = true;
-    } else if (word == "Pm" && read_factor(line, factor)) {
+    } else if (is("Pm") && read_factor(line, factor)) {
       material.metallic = factor;
-    } else if (word == "Ns" && !rough_given && read_factor(line, factor) && factor >= 0) {
+    } else if (is("Ns") && !rough_given && read_factor(line, factor) && factor >= 0) {
       material.roughness = std::sqrt(2.0f / (factor + 2.0f));  // the Beckmann width of a Phong lobe
     } else if (MtlMap* map = map_by(word, *entry)) {
       budget.charge(path.string(), 2 * line.size() + 64);
       *map = read_map(line, notes);
-    } else if (word.starts_with("map_") || word == "bump" || word == "norm" || word == "disp" ||
-               word == "decal" || word == "refl") {
+    } else if (equals_ignoring_case(word.substr(0, 4), "map_") || word == "bump" || word == "norm" ||
+               word == "disp" || word == "decal" || word == "refl") {
       notes.insert(std::string(word) + " is not read");
     }
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "import/find_file.h"
 #include "import/source_file.h"
 #include "lsp/program.h"
 
@@ -68,6 +69,9 @@ uint32_t MtlTextures::add(const MtlMaterial& source, std::map<uint32_t, Surface>
       const uint64_t texels =
           uint64_t{std::max(color.width, opacity.width)} * std::max(color.height, opacity.height);
       builder_.budget().charge(file_, texels, 4);
+      const MtlMap &a = source.color, &b = source.opacity;
+      if (!color.rgba.empty() && (a.scale != b.scale || a.offset != b.offset || a.clamp != b.clamp))
+        builder_.note(file_ + ": a map_d is placed as the map_Kd beside it, its own options are not read");
       color = with_alpha(color, opacity, source.opacity.channel);
     }
     base->second =
@@ -86,19 +90,15 @@ uint32_t MtlTextures::add(const MtlMaterial& source, std::map<uint32_t, Surface>
 // Empty, with a note, where it cannot be had.
 Picture MtlTextures::read(const MtlMaterial& source, const MtlMap& map) {
   Picture picture;
-  if (map.file.empty() || map.file.find('\0') != map.file.npos) return picture;
-  std::string name = map.file;
-  std::replace(name.begin(), name.end(), '\\', '/');
+  if (map.file.empty()) return picture;
   std::string why = "is not there";
-  // Exporters write the path on their own machine; the file itself is usually beside the library.
-  for (const auto& path : {source.folder / name, source.folder / std::filesystem::path(name).filename()}) {
-    std::error_code error;
-    if (!std::filesystem::is_regular_file(path, error)) continue;
+  bool guessed = false;
+  if (const auto path = find_file(source.folder, map.file, guessed); !path.empty()) {
+    if (guessed) builder_.note(file_ + ": the picture " + map.file + " is read from " + path.string());
     const std::string bytes = read_file(path, builder_.budget());
     builder_.add_source(path);
     picture = decode_picture(file_, bytes, builder_.budget(), why);
     builder_.budget().release(bytes.size());
-    break;
   }
   if (picture.rgba.empty())
     builder_.note(file_ + ": the picture " + map.file + " " + why + "; factors hold without it");

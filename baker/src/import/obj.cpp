@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include "import/find_file.h"
 #include "import/mtl.h"
 #include "import/mtl_textures.h"
 #include "import/polygons.h"
@@ -47,7 +48,7 @@ class ObjReader {
       builder_.note(file_ + ": " + std::to_string(other_elements_) +
                     " lines, points, curves or surfaces hold no triangle");
     }
-    make_colors_linear();
+    soup_.make_colors_linear();
     add_polygons(file_, soup_, builder_);
   }
 
@@ -105,18 +106,8 @@ class ObjReader {
     for (; count < 3 && take_word(line, word); ++count) color[count] = float(number_of(word));
     const bool given = count == 3 && std::isfinite(color.x + color.y + color.z);
     if (!given && soup_.colors.empty()) return;
-    while (soup_.colors.size() + 1 < soup_.positions.size()) push(soup_.colors, glm::vec3(1));
-    push(soup_.colors, given ? color : glm::vec3(1));
-    if (given) largest_color_ = std::max(largest_color_, std::max(color.x, std::max(color.y, color.z)));
-  }
-
-  // They are on the sRGB curve, from 0 to 1 or to 255.
-  void make_colors_linear() {
-    const double scale = largest_color_ > 1 ? 255 : 1;
-    for (glm::vec3& color : soup_.colors) {
-      for (int k = 0; k < 3; ++k)
-        color[k] = float(linear_of_srgb(std::clamp(double(color[k]) / scale, 0.0, 1.0)));
-    }
+    while (soup_.colors.size() + 1 < soup_.positions.size()) push(soup_.colors, kNoColor);
+    push(soup_.colors, given ? color : kNoColor);
   }
 
   void read_face(std::string_view line) {
@@ -154,36 +145,32 @@ class ObjReader {
   }
 
   // Reads the library `name`, if there is a file by that name.
-  bool try_library(std::string name, std::map<std::string, MtlMaterial>& materials) {
+  bool try_library(const std::string& name, std::map<std::string, MtlMaterial>& materials) {
     // A hostile line may name the same large file thousands of times.
     constexpr size_t kMaxTries = 1000;
     if (++libraries_tried_ > kMaxTries) return true;
-    std::replace(name.begin(), name.end(), '\\', '/');
-    // Exporters write the path on their own machine; the file itself is usually beside the mesh.
-    for (const auto& path :
-         {path_.parent_path() / name, path_.parent_path() / std::filesystem::path(name).filename()}) {
-      std::error_code error;
-      if (!std::filesystem::is_regular_file(path, error)) continue;
-      std::set<std::string> notes;
-      std::map<std::string, MtlMaterial> found;
-      read_mtl(path, builder_.budget(), found, notes);
-      builder_.add_source(path);
-      for (const std::string& note : notes) builder_.note(path.string() + ": " + note);
-      for (auto& [material, entry] : found) {
-        entry.folder = path.parent_path();
-        materials.try_emplace(material, std::move(entry));
-      }
-      return true;
+    bool guessed = false;
+    const std::filesystem::path path = find_file(path_.parent_path(), name, guessed);
+    if (path.empty()) return false;
+    if (guessed) builder_.note(file_ + ": the material library " + name + " is read from " + path.string());
+    std::set<std::string> notes;
+    std::map<std::string, MtlMaterial> found;
+    read_mtl(path, builder_.budget(), found, notes);
+    builder_.add_source(path);
+    for (const std::string& note : notes) builder_.note(path.string() + ": " + note);
+    for (auto& [material, entry] : found) {
+      entry.folder = path.parent_path();
+      materials.try_emplace(material, std::move(entry));
     }
-    return false;
+    return true;
   }
 
   // A mtllib line names one file, which may hold spaces, or several.
   void read_libraries(const std::string& words, std::map<std::string, MtlMaterial>& materials) {
-    if (words.empty() || words.find('\0') != words.npos || try_library(words, materials)) return;
+    if (words.empty() || try_library(std::string(unquoted(words)), materials)) return;
     std::string_view rest = words, word;
     while (take_word(rest, word)) {
-      if (!try_library(std::string(word), materials)) {
+      if (!try_library(std::string(unquoted(word)), materials)) {
         builder_.note(file_ + ": the material library " + std::string(word) + " is not there");
       }
     }
@@ -230,7 +217,6 @@ class ObjReader {
   std::vector<std::string> libraries_;
   size_t libraries_tried_ = 0;
   uint64_t other_elements_ = 0;
-  float largest_color_ = 0;
 };
 
 }  // namespace

@@ -61,6 +61,7 @@ class OffReader {
     for (uint64_t i = 0; i < face_count; ++i) read_face();
     if (unread_) builder_.note(file_ + ": colours by number, alpha or texture coordinates are not read");
     if (!colored_) soup_.face_colors.clear();
+    soup_.make_colors_linear();
     soup_.material = builder_.default_material();
     add_polygons(file_, soup_, builder_);
   }
@@ -98,16 +99,17 @@ class OffReader {
     take("ST");
     has_colors_ = take("C");
     has_normals_ = take("N");
+    has_colors_ = take("C") || has_colors_;  // NCOFF occurs, its values in the order of CNOFF
     homogeneous_ = take("4");
     if (take("n")) {
       throw Failure(Exit::kUnsupported, file_, "is an nOFF file, of any dimension; give one with three");
     }
-    if (!take("OFF")) {
+    if (!take("OFF") && !take("off")) {
       // The keyword may be left out; the counts then come first.
       int64_t number = 0;
       if (!integer_of(whole, number))
         throw Failure(Exit::kInvalid, file_, "does not start as an OFF file: export it again");
-      has_normals_ = homogeneous_ = false;
+      has_colors_ = has_normals_ = homogeneous_ = false;
       first = whole;
     }
     words_.put_back(first);  // "OFF8 6 12" occurs
@@ -132,36 +134,32 @@ class OffReader {
       for (int i = 0; i < 3; ++i) normal[i] = float(number_of(word()));
       push(soup_.normals, normal);
     }
-    glm::vec3 color(1);
+    glm::vec3 color = kNoColor;
     const bool given = has_colors_ && read_color(color);
     if (given || !soup_.colors.empty()) {
-      while (soup_.colors.size() + 1 < soup_.positions.size()) push(soup_.colors, glm::vec3(1));
+      while (soup_.colors.size() + 1 < soup_.positions.size()) push(soup_.colors, kNoColor);
       push(soup_.colors, color);
     }
     unread_ = words_.skip_line() || unread_;
   }
 
-  // Three numbers on the sRGB curve, from 0 to 255 where they are whole, else from 0 to 1; in linear light.
-  // What follows them is left. False, with nothing read, where there are not three.
+  // Three numbers; what follows them is left. False, with nothing read, where there are not three.
   bool read_color(glm::vec3& color) {
     Words ahead = words_;
     double values[3];
-    bool whole = true;
     for (double& value : values) {
       std::string_view text;
       if (!ahead.line_goes_on() || !ahead.next(text)) return false;
       value = number_of(text);
       if (!std::isfinite(value)) return false;
-      whole = whole && text.find('.') == text.npos;
     }
     words_ = ahead;
-    for (int i = 0; i < 3; ++i)
-      color[i] = float(linear_of_srgb(std::clamp(values[i] / (whole ? 255 : 1), 0.0, 1.0)));
+    color = glm::vec3(values[0], values[1], values[2]);
     std::string_view alpha;
     if (words_.line_goes_on()) {
       words_.next(alpha);
       const double value = number_of(alpha);
-      unread_ = unread_ || value != (whole ? 255 : 1);
+      unread_ = unread_ || (value != 255 && value != 1);
     }
     return true;
   }
@@ -175,7 +173,7 @@ class OffReader {
       push(soup_.corners, good ? uint32_t(index) : kNoIndex);
       if (has_normals_) push(soup_.corner_normals, soup_.corners.back());
     }
-    glm::vec3 color(1);
+    glm::vec3 color = kNoColor;
     colored_ = read_color(color) || colored_;
     unread_ = words_.skip_line() || unread_;
     if (soup_.end_face(file_, builder_.budget())) push(soup_.face_colors, color);

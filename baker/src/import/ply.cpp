@@ -1,11 +1,9 @@
 // PLY, ASCII and binary of either byte order: vertex x y z, nx ny nz, red green blue; face vertex_indices (or
 // vertex_index); tristrips. Every other element and property is skipped by its type.
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <cstring>
-#include <set>
 
+#include "import/ply_file.h"
 #include "import/polygons.h"
 #include "import/readers.h"
 #include "import/source_file.h"
@@ -15,224 +13,7 @@
 namespace lsp {
 namespace {
 
-enum class Type { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat32, kFloat64 };
-enum class Encoding { kAscii, kLittle, kBig };
-
-struct Property {
-  std::string name;
-  Type type = Type::kFloat32;
-  bool is_list = false;
-  Type count_type = Type::kUint8;
-};
-
-struct Element {
-  std::string name;
-  uint64_t count = 0;
-  std::vector<Property> properties;
-};
-
-size_t size_of(Type type) {
-  switch (type) {
-    case Type::kInt8:
-    case Type::kUint8:
-      return 1;
-    case Type::kInt16:
-    case Type::kUint16:
-      return 2;
-    case Type::kFloat64:
-      return 8;
-    default:
-      return 4;
-  }
-}
-
-bool type_of(std::string_view word, Type& type) {
-  constexpr std::pair<std::string_view, Type> kNames[] = {
-      {"char", Type::kInt8},      {"int8", Type::kInt8},       {"uchar", Type::kUint8},
-      {"uint8", Type::kUint8},    {"short", Type::kInt16},     {"int16", Type::kInt16},
-      {"ushort", Type::kUint16},  {"uint16", Type::kUint16},   {"int", Type::kInt32},
-      {"int32", Type::kInt32},    {"uint", Type::kUint32},     {"uint32", Type::kUint32},
-      {"float", Type::kFloat32},  {"float32", Type::kFloat32}, {"double", Type::kFloat64},
-      {"float64", Type::kFloat64}};
-  for (const auto& [name, value] : kNames) {
-    if (word == name) {
-      type = value;
-      return true;
-    }
-  }
-  return false;
-}
-
-[[noreturn]] void fail(const std::string& file, const std::string& what) {
-  throw Failure(Exit::kInvalid, file, what + ": export or copy it again");
-}
-
-struct Header {
-  Encoding encoding = Encoding::kAscii;
-  std::vector<Element> elements;
-  std::set<std::string> textures;  // named by comments, as some programs do
-};
-
-Header read_header(const std::string& file, std::string_view& text) {
-  Header header;
-  std::string_view line, word;
-  if (!take_line(text, line) || trim(line) != "ply") fail(file, "does not start as a PLY file");
-  bool encoded = false;
-  while (take_line(text, line)) {
-    if (!take_word(line, word) || word == "obj_info") continue;
-    if (word == "comment") {
-      if (take_word(line, word) && word == "TextureFile") header.textures.insert(std::string(trim(line)));
-      continue;
-    }
-    if (word == "end_header") {
-      if (!encoded) fail(file, "names no format in its header");
-      return header;
-    }
-    if (word == "format") {
-      take_word(line, word);
-      if (word == "ascii") {
-        header.encoding = Encoding::kAscii;
-      } else if (word == "binary_little_endian") {
-        header.encoding = Encoding::kLittle;
-      } else if (word == "binary_big_endian") {
-        header.encoding = Encoding::kBig;
-      } else {
-        throw Failure(Exit::kUnsupported, file,
-                      "has the format " + printable(word) + ", which PLY does not know");
-      }
-      encoded = true;
-    } else if (word == "element") {
-      Element element;
-      int64_t count = -1;
-      if (take_word(line, word)) element.name = word;
-      if (!take_word(line, word) || !integer_of(word, count) || count < 0) {
-        fail(file, "has an element without a number in its header");
-      }
-      element.count = uint64_t(count);
-      header.elements.push_back(std::move(element));
-    } else if (word == "property") {
-      Property property;
-      take_word(line, word);
-      property.is_list = word == "list";
-      bool good = !header.elements.empty();
-      if (property.is_list) {
-        good = good && take_word(line, word) && type_of(word, property.count_type) && take_word(line, word);
-      }
-      if (!good || !type_of(word, property.type) || !take_word(line, word)) {
-        fail(file, "has a property without a known type in its header");
-      }
-      property.name = word;
-      header.elements.back().properties.push_back(std::move(property));
-    }  // anything else is passed over: exporters have written comments without that word
-  }
-  fail(file, "has a header without an end");
-}
-
-// Values of the body one after the other. An element of an ASCII body may be broken over lines; what its last
-// line holds beyond the declared properties is passed over, as files with undeclared values exist.
-class Body {
- public:
-  Body(const std::string& file, std::string_view bytes, Encoding encoding)
-      : file_(file), bytes_(bytes), encoding_(encoding) {}
-
-  size_t left() const { return bytes_.size(); }
-
-  double number(Type type) {
-    if (encoding_ == Encoding::kAscii) return number_of(word());
-    switch (type) {
-      case Type::kInt8:
-        return double(binary<int8_t>());
-      case Type::kUint8:
-        return double(binary<uint8_t>());
-      case Type::kInt16:
-        return double(binary<int16_t>());
-      case Type::kUint16:
-        return double(binary<uint16_t>());
-      case Type::kInt32:
-        return double(binary<int32_t>());
-      case Type::kUint32:
-        return double(binary<uint32_t>());
-      case Type::kFloat32:
-        return double(binary<float>());
-      default:
-        return binary<double>();
-    }
-  }
-
-  // -1 for what is no whole number of 0 or more (strips end with -1).
-  int64_t index(Type type) {
-    if (encoding_ == Encoding::kAscii) {
-      const std::string_view text = word();
-      int64_t value = -1;
-      if (integer_of(text, value)) return value;
-      return whole(number_of(text));
-    }
-    return whole(number(type));
-  }
-
-  void end_element() {
-    if (encoding_ != Encoding::kAscii) return;
-    size_t end = 0;
-    while (end < bytes_.size() && !is_line_end(bytes_[end])) ++end;
-    bytes_.remove_prefix(end);
-  }
-
-  void skip(const Property& property) {
-    const uint64_t count = property.is_list ? list_length(property) : 1;
-    if (encoding_ != Encoding::kAscii) {
-      take(count * size_of(property.type));
-    } else {
-      for (uint64_t i = 0; i < count; ++i) word();
-    }
-  }
-
-  uint64_t list_length(const Property& property) {
-    const int64_t count = index(property.count_type);
-    const size_t least = encoding_ == Encoding::kAscii ? 1 : size_of(property.type);
-    if (count < 0 || uint64_t(count) > left() / least)
-      fail(file_, "has a list longer than what is left of it");
-    return uint64_t(count);
-  }
-
- private:
-  static int64_t whole(double value) {
-    return value >= 0 && value < 9e15 && value == std::floor(value) ? int64_t(value) : -1;
-  }
-
-  std::string_view word() {
-    size_t begin = 0;
-    const auto is_space = [](char c) { return is_blank(c) || is_line_end(c); };
-    while (begin < bytes_.size() && is_space(bytes_[begin])) ++begin;
-    size_t end = begin;
-    while (end < bytes_.size() && !is_space(bytes_[end])) ++end;
-    const std::string_view found = bytes_.substr(begin, end - begin);
-    if (found.empty()) fail(file_, "holds less than its header says");
-    bytes_.remove_prefix(end);
-    return found;
-  }
-
-  std::string_view take(uint64_t count) {
-    if (count > bytes_.size()) fail(file_, "holds less than its header says");
-    const std::string_view taken = bytes_.substr(0, count);
-    bytes_.remove_prefix(count);
-    return taken;
-  }
-
-  template <typename T>
-  T binary() {
-    char raw[sizeof(T)];
-    std::memcpy(raw, take(sizeof(T)).data(), sizeof(T));
-    static_assert(std::endian::native == std::endian::little);
-    if (encoding_ == Encoding::kBig) std::reverse(raw, raw + sizeof(T));
-    T value;
-    std::memcpy(&value, raw, sizeof(T));
-    return value;
-  }
-
-  const std::string& file_;
-  std::string_view bytes_;
-  const Encoding encoding_;
-};
+using namespace ply;
 
 class PlyReader {
  public:
@@ -253,8 +34,10 @@ class PlyReader {
         read_faces(element, true);
       } else {
         skip(element);
+        if (element.count > 0) builder_.note(file_ + ": the element " + element.name + " is not read");
       }
     }
+    soup_.make_colors_linear();
     for (const std::string& name : header.textures)
       builder_.note(file_ + ": the texture " + name + " is not read, its coordinates neither");
     if (translucent_) builder_.note(file_ + ": alpha of vertices or faces is not read, all count as solid");
@@ -266,7 +49,8 @@ class PlyReader {
   static bool holds_normals(const Element& element) {
     int found = 0;
     for (const Property& property : element.properties) {
-      found += !property.is_list && (property.name == "nx" || property.name == "ny" || property.name == "nz");
+      for (const std::string_view name : {"nx", "ny", "nz"})
+        found += !property.is_list && equals_ignoring_case(property.name, name);
     }
     return found >= 3;
   }
@@ -307,31 +91,37 @@ class PlyReader {
   };
 
   static ColorProperties color_properties(const Element& element) {
-    constexpr std::string_view kNames[] = {"red", "green", "blue", "alpha"};
+    constexpr std::string_view kNames[] = {"red", "green", "blue", "alpha"}, kShort[] = {"r", "g", "b", "a"};
     ColorProperties out;
     for (size_t k = 0; k < element.properties.size(); ++k) {
       std::string_view name = element.properties[k].name;
-      if (name.starts_with("diffuse_")) name.remove_prefix(8);
+      if (equals_ignoring_case(name.substr(0, 8), "diffuse_")) name.remove_prefix(8);
       for (int i = 0; i < 4; ++i) {
-        if (name != kNames[i] || element.properties[k].is_list || out.places[i] >= 0) continue;
+        const bool named = equals_ignoring_case(name, kNames[i]) || equals_ignoring_case(name, kShort[i]);
+        if (!named || element.properties[k].is_list || out.places[i] >= 0) continue;
         out.places[i] = int(k);
         const Type type = element.properties[k].type;
-        if (type == Type::kUint8) out.scale = 255;
-        if (type == Type::kUint16) out.scale = 65535;
+        if (type != Type::kFloat32 && type != Type::kFloat64) out.scale = type == Type::kUint16 ? 65535 : 255;
       }
     }
     return out;
   }
 
-  // What was read of a colour, on the sRGB curve, in linear light.
-  glm::vec3 linear_color(const glm::dvec4& color, double scale) {
-    glm::vec3 out;
-    for (int i = 0; i < 3; ++i) {
-      const double value = color[i] / scale;
-      out[i] = float(linear_of_srgb(std::isfinite(value) ? std::clamp(value, 0.0, 1.0) : 1.0));
-    }
+  // What was read of a colour, as a part of `scale`.
+  glm::vec3 scaled_color(const glm::dvec4& color, double scale) {
     translucent_ = translucent_ || color.a < scale;
-    return out;
+    return glm::vec3(glm::dvec3(color) / scale);
+  }
+
+  // Names the properties of an element that `is_read` does not say are read.
+  template <typename IsRead>
+  void note_unread(const Element& element, const IsRead& is_read) {
+    std::string names;
+    for (size_t k = 0; k < element.properties.size() && names.size() < 200; ++k) {
+      if (!is_read(k)) names += (names.empty() ? "" : ", ") + element.properties[k].name;
+    }
+    if (!names.empty() && element.count > 0)
+      builder_.note(file_ + ": of each " + element.name + " " + names + " is not read");
   }
 
   void read_vertices(const Element& element) {
@@ -344,12 +134,14 @@ class PlyReader {
       const Property& property = element.properties[k];
       int target = -1;
       for (int i = 0; i < 6; ++i) {
-        if (property.name == kTargets[i] && !property.is_list && !(seen >> i & 1)) target = i;
+        if (equals_ignoring_case(property.name, kTargets[i]) && !property.is_list && !(seen >> i & 1))
+          target = i;
       }
       if (target >= 0) seen |= 1 << target;
       if (const int component = color.component(k); color.there() && component >= 0) target = 6 + component;
       targets.push_back(target);
     }
+    note_unread(element, [&](size_t k) { return targets[k] >= 0; });
     if (element.count > 0 && (seen & 7) != 7) fail(file_, "has vertices without x, y and z");
     if (element.count >= kNoIndex - soup_.positions.size()) {
       throw Failure(Exit::kLimit, file_, "holds more than 2^32 - 2 vertices, split the mesh");
@@ -373,8 +165,8 @@ class PlyReader {
       soup_.positions.push_back({values[0], values[1], values[2]});
       if (has_normals_) soup_.normals.push_back(glm::vec3(values[3], values[4], values[5]));
       if (!color.there()) continue;
-      soup_.colors.resize(soup_.positions.size() - 1, glm::vec3(1));
-      soup_.colors.push_back(linear_color({values[6], values[7], values[8], values[9]}, color.scale));
+      soup_.colors.resize(soup_.positions.size() - 1, kNoColor);
+      soup_.colors.push_back(scaled_color({values[6], values[7], values[8], values[9]}, color.scale));
     }
   }
 
@@ -382,10 +174,12 @@ class PlyReader {
     size_t list = element.properties.size();
     for (size_t k = 0; k < element.properties.size(); ++k) {
       const Property& property = element.properties[k];
-      if (property.is_list && (property.name == "vertex_indices" || property.name == "vertex_index"))
+      if (property.is_list && (equals_ignoring_case(property.name, "vertex_indices") ||
+                               equals_ignoring_case(property.name, "vertex_index")))
         list = k;
     }
     const ColorProperties color = color_properties(element);
+    note_unread(element, [&](size_t k) { return k == list || (color.there() && color.component(k) >= 0); });
     if (list == element.properties.size()) return skip(element);
     std::vector<uint32_t> strip;
     for (uint64_t i = 0; i < element.count; ++i) {
@@ -424,8 +218,8 @@ class PlyReader {
       body_.end_element();
       if (!color.there()) continue;
       soup_.face_colors.resize(std::min(soup_.face_colors.size(), soup_.face_ends.size()));
-      const glm::vec3 linear = linear_color(rgba, color.scale);
-      while (soup_.face_colors.size() < soup_.face_ends.size()) push(soup_.face_colors, linear);
+      const glm::vec3 own = scaled_color(rgba, color.scale);
+      while (soup_.face_colors.size() < soup_.face_ends.size()) push(soup_.face_colors, own);
     }
   }
 
@@ -464,8 +258,8 @@ void read_ply(const std::filesystem::path& path, MeshBuilder& builder) {
   const std::string file = path.string();
   const std::string bytes = read_file(path, builder.budget());
   std::string_view text = bytes;
-  const Header header = read_header(file, text);
-  Body body(file, text, header.encoding);
+  const ply::Header header = ply::read_header(file, text);
+  ply::Body body(file, text, header.encoding);
   PlyReader(file, body, builder).read(header);
 }
 

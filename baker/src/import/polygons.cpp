@@ -1,7 +1,9 @@
 #include "import/polygons.h"
 
+#include <algorithm>
 #include <cmath>
 
+#include "import/rounding.h"
 #include "lsp/program.h"
 
 namespace lsp {
@@ -38,6 +40,13 @@ bool project(std::span<const glm::dvec3> corners, std::vector<glm::dvec2>& flat)
   return true;
 }
 
+bool is_line(std::span<const glm::dvec3> corners) {
+  for (size_t i = 2; i < corners.size(); ++i) {
+    if (!is_degenerate(corners[0], corners[i - 1], corners[i])) return false;
+  }
+  return true;
+}
+
 // Whether every turn is to the left or straight: then the fan is at least as good as any other cut.
 bool is_convex(std::span<const glm::dvec2> flat) {
   const size_t n = flat.size();
@@ -64,6 +73,22 @@ bool PolygonSoup::end_face(const std::string& file, Budget& budget) {
   return true;
 }
 
+void PolygonSoup::make_colors_linear() {
+  for (std::vector<glm::vec3>* list : {&colors, &face_colors}) {
+    float largest = 0;
+    for (const glm::vec3& color : *list) {
+      for (int i = 0; i < 3; ++i) largest = std::isfinite(color[i]) ? std::max(largest, color[i]) : largest;
+    }
+    const double scale = largest > 1 ? 255 : 1;
+    for (glm::vec3& color : *list) {
+      for (int i = 0; i < 3; ++i) {
+        const double value = std::isfinite(color[i]) ? std::clamp(double(color[i]) / scale, 0.0, 1.0) : 1.0;
+        color[i] = float(linear_of_srgb(value));
+      }
+    }
+  }
+}
+
 uint64_t PolygonSoup::triangle_count() const { return corners.size() - 2 * face_ends.size(); }
 
 EarCut triangulate(std::span<const glm::dvec3> corners, std::vector<glm::uvec3>& out, uint64_t& work) {
@@ -72,9 +97,17 @@ EarCut triangulate(std::span<const glm::dvec3> corners, std::vector<glm::uvec3>&
   static thread_local EarClipper clipper;
   ring.resize(corners.size());
   for (size_t i = 0; i < ring.size(); ++i) ring[i] = uint32_t(i);
-  if (corners.size() < 4 || work == 0 || !project(corners, flat) || is_convex(flat)) {
+  if (corners.size() < 4 || work == 0) {
     fan(ring, out);
     return work == 0 ? EarCut::kGaveUp : EarCut::kRight;
+  }
+  if (!project(corners, flat)) {  // no area: a line, or parts that turn either way and cancel out
+    fan(ring, out);
+    return is_line(corners) ? EarCut::kRight : EarCut::kCrossed;
+  }
+  if (is_convex(flat)) {
+    fan(ring, out);
+    return EarCut::kRight;
   }
   return clipper.cut(flat, out, work);
 }
@@ -123,10 +156,11 @@ void cut_faces(const std::string& file, const PolygonSoup& soup, MeshBuilder& bu
 }
 
 // A colour for each piece.
-std::vector<TriangleColor> piece_colors(const PolygonSoup& soup, std::span<const Piece> pieces,
-                                        MeshBuilder& builder) {
+std::vector<TriangleColor> piece_colors(const std::string& file, const PolygonSoup& soup,
+                                        std::span<const Piece> pieces, MeshBuilder& builder) {
   std::map<uint32_t, std::vector<uint32_t>> by_material;
   for (uint32_t i = 0; i < pieces.size(); ++i) by_material[material_of(soup, pieces[i].face)].push_back(i);
+  bool unplaced = false;
   const bool by_vertex = !soup.colors.empty() || !soup.face_colors.empty();
   std::vector<TriangleColor> colors(pieces.size());
   for (const auto& [material, list] : by_material) {
@@ -136,6 +170,13 @@ std::vector<TriangleColor> piece_colors(const PolygonSoup& soup, std::span<const
     if (by_vertex && builder.is_default(material)) surface.base_color = glm::vec3(1);
     if (const auto found = soup.surfaces.find(material); found != soup.surfaces.end())
       surface = found->second;
+    for (size_t t = 0; t < list.size() && surface.has_textures() && !unplaced; ++t) {
+      for (int i = 0; i < 3; ++i) {
+        const uint32_t corner = pieces[list[t]].corners[i];
+        unplaced = unplaced || corner >= soup.corner_texcoords.size() ||
+                   soup.corner_texcoords[corner] >= soup.texcoords.size();
+      }
+    }
     const std::vector<TriangleColor> own =
         mean_colors(surface, list.size(), [&](size_t t, SurfaceCorner(&out)[3]) {
           const Piece& piece = pieces[list[t]];
@@ -154,6 +195,8 @@ std::vector<TriangleColor> piece_colors(const PolygonSoup& soup, std::span<const
         });
     for (size_t i = 0; i < list.size(); ++i) colors[list[i]] = own[i];
   }
+  if (unplaced)
+    builder.note(file + ": faces have a texture and no texture coordinates, its corner texel holds");
   return colors;
 }
 
@@ -179,7 +222,7 @@ void add_polygons(const std::string& file, const PolygonSoup& soup, MeshBuilder&
     std::vector<Piece> pieces;
     pieces.reserve(soup.triangle_count());
     cut_faces(file, soup, builder, [&](const Piece& piece) { pieces.push_back(piece); });
-    const std::vector<TriangleColor> colors = piece_colors(soup, pieces, builder);
+    const std::vector<TriangleColor> colors = piece_colors(file, soup, pieces, builder);
     for (size_t i = 0; i < pieces.size(); ++i) add(pieces[i], &colors[i]);
   } else {
     cut_faces(file, soup, builder, [&](const Piece& piece) { add(piece, nullptr); });

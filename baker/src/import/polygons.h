@@ -2,6 +2,7 @@
 #pragma once
 
 #include <glm/glm.hpp>
+#include <limits>
 #include <map>
 #include <span>
 #include <string>
@@ -12,6 +13,8 @@
 #include "import/surface_color.h"
 
 namespace lsp {
+
+inline const glm::vec3 kNoColor(std::numeric_limits<float>::quiet_NaN());
 
 // Faces with any number of corners over shared positions and normals. Indices may be out of range; the
 // builder rejects what refers to nothing.
@@ -26,8 +29,8 @@ struct PolygonSoup {
   // What gives triangles colours of their own; all empty where nothing does.
   std::vector<glm::dvec2> texcoords;       // their origin at the picture's upper left
   std::vector<uint32_t> corner_texcoords;  // into texcoords (kNoIndex: none); empty or as long as corners
-  std::vector<glm::vec3> colors;           // per position, linear
-  std::vector<glm::vec3> face_colors;      // per face, linear
+  std::vector<glm::vec3> colors;           // per position; linear once make_colors_linear() was called
+  std::vector<glm::vec3> face_colors;      // per face, likewise
   std::map<uint32_t, Surface> surfaces;    // of materials with textures
   uint64_t too_small = 0;                  // faces with fewer than three corners, not in the lists
 
@@ -35,6 +38,9 @@ struct PolygonSoup {
   // counted: it holds no triangle. True where it was kept.
   bool end_face(const std::string& file, Budget& budget);
   uint64_t triangle_count() const;
+  // Colours, as files give them, are on the sRGB curve: from 0 to 255 where any is above 1, else from 0 to 1.
+  // What is no number (kNoColor) becomes white.
+  void make_colors_linear();
   bool has_colors() const { return !colors.empty() || !face_colors.empty() || !surfaces.empty(); }
 };
 

@@ -20,6 +20,7 @@
 
 #include <filesystem>
 
+#include "import/gltf_animation.h"
 #include "import/mesh_builder.h"
 
 namespace lsp {
@@ -28,6 +29,7 @@ void read_obj(const std::filesystem::path& path, MeshBuilder& builder);
 void read_ply(const std::filesystem::path& path, MeshBuilder& builder);
 void read_stl(const std::filesystem::path& path, MeshBuilder& builder);
 void read_off(const std::filesystem::path& path, MeshBuilder& builder);
-void read_gltf(const std::filesystem::path& path, MeshBuilder& builder);  // .gltf and .glb
+// .gltf and .glb, at rest or in the pose that is asked for.
+void read_gltf(const std::filesystem::path& path, MeshBuilder& builder, PoseRequest& pose);
 
 }  // namespace lsp

@@ -39,17 +39,18 @@ bool looks_ascii(std::string_view bytes) {
   return !first && bytes.size() < kHeaderBytes;
 }
 
-// Whether bytes read as a triangle hold one: a tail of anything else will not.
-bool is_plausible(std::string_view triangle) {
+// What bytes read as a triangle hold: anything else than triangles will look like noise.
+enum class Looks { kTriangle, kZero, kNoise };
+Looks look_at(std::string_view triangle) {
   float corners[9];
   std::memcpy(corners, triangle.data() + sizeof(glm::vec3), sizeof corners);
-  bool some = false;
+  Looks looks = Looks::kZero;
   for (const float value : corners) {
     if (!std::isfinite(value) || std::abs(value) > 1e20f || (value != 0 && std::abs(value) < 1e-20f))
-      return false;
-    some = some || value != 0;
+      return Looks::kNoise;
+    if (value != 0) looks = Looks::kTriangle;
   }
-  return some;
+  return looks;
 }
 
 // How many triangles a binary file holds. Writers that stream leave the count 0 or at its largest, others
@@ -58,10 +59,14 @@ uint32_t count_triangles(const std::string& file, std::string_view bytes, MeshBu
   const uint64_t declared = binary_count(bytes), fits = (bytes.size() - kHeaderBytes) / kTriangleBytes;
   const bool whole = (bytes.size() - kHeaderBytes) % kTriangleBytes == 0;
   if (declared == fits && whole) return uint32_t(declared);
-  bool all = fits > 0 && fits < kNoIndex && (whole || declared == 0);
-  for (uint64_t i = std::min(declared, fits); i < fits && all; ++i)
-    all = is_plausible(bytes.substr(kHeaderBytes + i * kTriangleBytes, kTriangleBytes));
-  if (all) {
+  bool all = fits > 0 && fits < kNoIndex && (whole || declared == 0), any = declared > fits;
+  for (uint64_t i = std::min(declared, fits); i < fits && all; ++i) {
+    const Looks looks = look_at(bytes.substr(kHeaderBytes + i * kTriangleBytes, kTriangleBytes));
+    // Zeros may be a triangle without an area, or padding behind those that are declared.
+    all = looks == Looks::kTriangle || (looks == Looks::kZero && declared == 0);
+    any = any || looks == Looks::kTriangle;
+  }
+  if (all && any) {
     builder.note(file + ": declares " + std::to_string(declared) + " triangles and holds " +
                  std::to_string(fits) + ", all of them are read");
     return uint32_t(fits);
@@ -70,6 +75,10 @@ uint32_t count_triangles(const std::string& file, std::string_view bytes, MeshBu
     throw Failure(Exit::kInvalid, file,
                   "declares " + std::to_string(declared) + " triangles and has bytes for " +
                       std::to_string(fits) + ", it is cut short or no STL file: export or copy it again");
+  }
+  if (declared == 0 && fits > 0) {
+    throw Failure(Exit::kInvalid, file,
+                  "declares no triangle, and the bytes after its header are none: export or copy it again");
   }
   builder.note(file + ": bytes after the last triangle are not used");
   return uint32_t(declared);
@@ -140,12 +149,16 @@ void read_ascii(const std::string& file, std::string_view text, PolygonSoup& sou
 void read_stl(const std::filesystem::path& path, MeshBuilder& builder) {
   const std::string file = path.string();
   const std::string bytes = read_file(path, builder.budget());
+  // A byte order mark is text's.
+  const std::string_view start = std::string_view(bytes).substr(0, 3);
+  const bool marked =
+      start == "\xEF\xBB\xBF" || start.starts_with("\xFF\xFE") || start.starts_with("\xFE\xFF");
   PolygonSoup soup;
   soup.material = builder.default_material();
   const bool has_header = bytes.size() >= kHeaderBytes;
   const bool fits =
       has_header && bytes.size() == kHeaderBytes + kTriangleBytes * uint64_t{binary_count(bytes)};
-  if (!fits && looks_ascii(bytes)) {
+  if (!fits && (marked || looks_ascii(bytes))) {
     const std::string text = read_text(path, builder.budget());
     read_ascii(file, text, soup, builder);
   } else if (has_header) {

@@ -18,6 +18,12 @@ inline std::string_view trim(std::string_view text) {
   return text;
 }
 
+// What stands between quotation marks, where a whole text does.
+inline std::string_view unquoted(std::string_view text) {
+  const bool quoted = text.size() >= 2 && text.front() == '"' && text.back() == '"';
+  return quoted ? text.substr(1, text.size() - 2) : text;
+}
+
 // Takes the next line off `text`, without its end; a line ends at LF, CR LF or a bare CR. False at the end.
 inline bool take_line(std::string_view& text, std::string_view& line) {
   if (text.empty()) return false;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "import/find_file.h"
 #include "lsp/program.h"
 
 namespace lsp {
@@ -33,12 +34,15 @@ std::string decode_data_uri(const std::string& file, std::string_view uri) {
     return Failure(Exit::kInvalid, file, "has a data URI that is not base64, export it again");
   };
   const size_t comma = uri.find(',');
-  if (comma == uri.npos || uri.substr(0, comma).find(";base64") == uri.npos) throw fail();
+  if (comma == uri.npos || comma < 7 || !equals_ignoring_case(uri.substr(comma - 7, 7), ";base64"))
+    throw fail();
+  const std::string body = decode_percent(uri.substr(comma + 1));
   std::string out;
   out.reserve((uri.size() - comma) / 4 * 3);
   uint32_t bits = 0;
   int held = 0;
-  for (const char c : uri.substr(comma + 1)) {
+  for (const char c : body) {
+    if (is_blank(c) || is_line_end(c)) continue;
     int value = -1;
     if (c >= 'A' && c <= 'Z') value = c - 'A';
     if (c >= 'a' && c <= 'z') value = c - 'a' + 26;
@@ -54,7 +58,8 @@ std::string decode_data_uri(const std::string& file, std::string_view uri) {
   return out;
 }
 
-std::filesystem::path resolve_uri(const std::filesystem::path& document, std::string_view uri, bool& odd) {
+std::filesystem::path resolve_uri(const std::filesystem::path& document, std::string_view uri,
+                                  std::string& remark) {
   const std::string decoded = decode_percent(uri);
   if (decoded.find('\0') != decoded.npos) {
     throw Failure(Exit::kInvalid, document.string(),
@@ -62,15 +67,20 @@ std::filesystem::path resolve_uri(const std::filesystem::path& document, std::st
   }
   std::string slashes = decoded;
   std::replace(slashes.begin(), slashes.end(), '\\', '/');
-  odd = false;
+  const std::string local = decoded.starts_with("file://") ? decoded.substr(7) : decoded;
   const std::filesystem::path folder = document.parent_path();
-  for (const std::string& name : {decoded, std::string(uri), slashes}) {
+  remark.clear();
+  for (const std::string& name : {local, std::string(uri), slashes}) {
     std::error_code error;
-    odd = name != decoded;
-    if (std::filesystem::is_regular_file(folder / name, error)) return folder / name;
+    if (!std::filesystem::is_regular_file(folder / name, error)) continue;
+    if (name != local) remark = "the URI " + std::string(uri) + " is no valid one, it is read as a path";
+    return folder / name;
   }
-  odd = false;
-  return folder / decoded;
+  bool guessed = false;
+  const std::filesystem::path found = find_file(folder, local, guessed);
+  if (found.empty()) return folder / local;
+  remark = "the file " + local + " is not there, " + found.filename().string() + " is read in its place";
+  return found;
 }
 
 }  // namespace lsp

@@ -8,6 +8,8 @@
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
+#include <optional>
+#include <string_view>
 
 #include "import/import.h"
 #include "lsp/program.h"
@@ -48,10 +50,17 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     std::ofstream file(path, std::ios::binary | std::ios::trunc);
     file.write(reinterpret_cast<const char*>(data), std::streamsize(size));
   }
-  try {
-    check(lsp::import_meshes({&path, 1}, {.memory_limit = 256 << 20}));
-  } catch (const lsp::Failure& failure) {
-    require(failure.exit() != lsp::Exit::kInternal && failure.what()[0] != '\0', "failure without a reason");
+  const bool animated = std::string_view(reinterpret_cast<const char*>(data), size).find("\"animations\"") !=
+                        std::string_view::npos;
+  for (const bool posed : {false, true}) {
+    if (posed && !animated) break;
+    try {
+      const std::optional<double> time = posed ? std::optional(0.5) : std::nullopt;
+      check(lsp::import_meshes({&path, 1}, {.memory_limit = 256 << 20, .time = time}));
+    } catch (const lsp::Failure& failure) {
+      require(failure.exit() != lsp::Exit::kInternal && failure.what()[0] != '\0',
+              "failure without a reason");
+    }
   }
   return 0;
 }

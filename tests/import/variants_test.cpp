@@ -1,0 +1,189 @@
+// What programs write beside the letter of a format, and what is not read of it.
+#include <cmath>
+
+#include "gltf_builder.h"
+#include "png_bytes.h"
+
+namespace {
+
+using lsp::Exit;
+using lsp::Mesh;
+using namespace lsp_test;
+
+class Variants : public MeshFiles {
+ protected:
+  void expect_color(const Mesh& mesh, const glm::vec3& right) {
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(mesh.color(0).base_color[k], right[k], 1e-4f) << k;
+  }
+};
+
+constexpr float kGrey128 = 0.21586f;  // 128 of 255 on the sRGB curve
+
+std::string ply(const std::string& properties, const std::string& values, const std::string& more = "",
+                const std::string& tail = "") {
+  std::string text =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n" +
+      properties + "element face 1\nproperty list uchar int vertex_indices\n" + more + "end_header\n";
+  for (const char* at : {"0 0 0 ", "1 0 0 ", "0 1 0 "}) text += at + values + "\n";
+  return text + "3 0 1 2" + tail + "\n";
+}
+
+std::string rgb(const std::string& type, const char* r = "red", const char* g = "green",
+                const char* b = "blue") {
+  std::string out;
+  for (const char* name : {r, g, b}) out += "property " + type + " " + name + "\n";
+  return out;
+}
+
+TEST_F(Variants, PlyColoursOfEveryType) {
+  const glm::vec3 right(1, 0, kGrey128);
+  expect_color(import("a.ply", ply(rgb("uchar"), "255 0 128")), right);
+  expect_color(import("a.ply", ply(rgb("ushort"), "65535 0 32896")), right);
+  expect_color(import("a.ply", ply(rgb("int"), "255 0 128")), right);
+  expect_color(import("a.ply", ply(rgb("float"), "255 0 128")), right);
+  expect_color(import("a.ply", ply(rgb("float"), "1 0 0.50196")), right);
+  expect_color(import("a.ply", ply(rgb("uchar", "r", "g", "b"), "255 0 128")), right);
+  expect_color(import("a.ply", ply(rgb("uchar", "Red", "Green", "Blue"), "255 0 128")), right);
+  expect_color(import("a.ply", ply("", "", rgb("float"), " 255 0 128")), right);
+}
+
+TEST_F(Variants, ObjVerticesWithoutAColourAreWhite) {
+  const Mesh mesh =
+      import("a.obj",
+             "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1 255 0 128\nv 1 0 1 255 0 128\nv 0 1 1 255 0 128\n"
+             "f 4 5 6\nf 1 2 3\n");
+  expect_color(mesh, {1, 0, kGrey128});
+  EXPECT_EQ(mesh.color(1).base_color, glm::vec3(1));
+}
+
+TEST_F(Variants, PlyNamesWhatItDoesNotRead) {
+  const Mesh mesh =
+      import("a.ply", ply("property float s\nproperty float t\n", "0 0",
+                          "property int flags\nproperty list uchar float texcoord\n", " 7 2 0 0"));
+  EXPECT_TRUE(has_note(mesh, "of each vertex s, t is not read"));
+  EXPECT_TRUE(has_note(mesh, "of each face flags, texcoord is not read"));
+  EXPECT_TRUE(has_note(import("a.ply", ply("", "", "element edge 1\nproperty int a\n", "\n7")),
+                       "the element edge is not read"));
+  EXPECT_TRUE(import("a.ply", ply("", "")).notes.empty());
+}
+
+TEST_F(Variants, PlyInCapitalsOrWithAByteOrderMark) {
+  std::string text = ply("", "");
+  for (const char* name : {" x\n", " y\n", " z\n"}) text[text.find(name) + 1] -= 'a' - 'A';
+  EXPECT_EQ(import("a.ply", text).triangles.size(), 1u);
+  EXPECT_EQ(import("a.ply", "\xEF\xBB\xBF" + ply("", "")).triangles.size(), 1u);
+}
+
+std::string off(const std::string& keyword, const std::string& values, const std::string& face = "") {
+  std::string text = keyword + "\n3 1 0\n";
+  for (const char* at : {"0 0 0 ", "1 0 0 ", "0 1 0 "}) text += at + values + "\n";
+  return text + "3 0 1 2" + face + "\n";
+}
+
+TEST_F(Variants, OffColoursByTheirLargest) {
+  expect_color(import("a.off", off("COFF", "255 0 128 255")), {1, 0, kGrey128});
+  expect_color(import("a.off", off("COFF", "1 0 0.50196 1")), {1, 0, kGrey128});
+  expect_color(import("a.off", off("COFF", "1 0 0 1")), {1, 0, 0});
+  expect_color(import("a.off", off("OFF", "", " 1 0 0")), {1, 0, 0});
+  expect_color(import("a.off", off("OFF", "", " 255 0 128")), {1, 0, kGrey128});
+  EXPECT_TRUE(import("a.off", off("COFF", "1 0 0 1")).notes.empty());
+  EXPECT_TRUE(has_note(import("a.off", off("COFF", "255 0 0 128")), "alpha"));
+  // Faces without a colour beside one with: white.
+  std::string two = off("OFF", "", " 255 0 0") + "3 0 2 1\n";
+  two.replace(two.find("3 1 0"), 5, "3 2 0");
+  EXPECT_EQ(import("a.off", two).color(1).base_color, glm::vec3(1));
+}
+
+TEST_F(Variants, OffKeywords) {
+  for (const char* keyword : {"CNOFF", "NCOFF"}) {
+    const Mesh mesh = import("a.off", off(keyword, "0 0 -1 255 0 0 255"));
+    expect_color(mesh, {1, 0, 0});
+    EXPECT_EQ(mesh.normals[0][0], glm::vec3(0, 0, -1)) << keyword;
+  }
+  EXPECT_EQ(import("a.off", off("off", "")).triangles.size(), 1u);
+}
+
+TEST_F(Variants, StlTextInAnyEncoding) {
+  const std::string text =
+      "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
+      "endsolid a\n";
+  std::string wide = "\xFF\xFE";
+  for (const char c : text) (wide += c) += '\0';
+  for (const std::string& bytes : {text, "\xEF\xBB\xBF" + text, wide}) {
+    const Mesh mesh = import("a.stl", bytes);
+    ASSERT_EQ(mesh.triangles.size(), 1u);
+    EXPECT_EQ(corner(mesh, 0, 1), glm::vec3(1, 0, 0));
+  }
+}
+
+// Triangles without an area are triangles, where a count of 0 says nothing of how many there are.
+TEST_F(Variants, StlWithoutACountAndWithEmptyTriangles) {
+  std::string bytes(84, ' ');
+  std::memset(bytes.data() + 80, 0, 4);
+  const std::string none(50, '\0');
+  std::string one;
+  for (const float x : {0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f, 0.f}) append(one, x);
+  one += std::string(2, '\0');
+  const Mesh mesh = import("a.stl", bytes + one + none + one);
+  EXPECT_EQ(mesh.primitive_count, 3u);
+  EXPECT_EQ(mesh.triangles.size(), 2u);
+  EXPECT_TRUE(has_note(mesh, "declares 0 triangles and holds 3"));
+  const Refusal noise = refusal("a.stl", bytes + std::string(100, '\xFF'));
+  EXPECT_EQ(noise.exit, Exit::kInvalid);
+  EXPECT_NE(noise.message.find("declares no triangle, and the bytes after its header are none"),
+            std::string::npos);
+  bytes[80] = 1;
+  EXPECT_EQ(import("a.stl", bytes + one + none).primitive_count, 1u) << "zeros behind are padding";
+}
+
+TEST_F(Variants, APolygonWhosePartsCancelOutIsNoted) {
+  const std::string four = "v 0 0 0\nv 1 1 0\nv 1 0 0\nv 0 1 0\n";
+  EXPECT_TRUE(has_note(import("a.obj", four + "f 1 2 3 4\n"), "1 polygons cross themselves"));
+  EXPECT_TRUE(import("a.obj", four + "f 1 3 2 4\n").notes.empty());
+  const Mesh line = import("a.obj", four + "v 2 2 0\nv 3 3 0\nf 1 2 5 6\nf 1 3 2\n");
+  EXPECT_FALSE(has_note(line, "cross themselves"));
+  EXPECT_EQ(line.rejected.degenerate, 2u);
+}
+
+TEST_F(Variants, MtlColoursThatAreNoneAndFacesWithoutCoordinatesAreNoted) {
+  const std::string obj = "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\n";
+  write("a.mtl", "newmtl m\nKd spectral sun.rfl\n");
+  EXPECT_TRUE(has_note(import("a.obj", obj + "f 1 2 3\n"), "a Kd that is no three numbers is not read"));
+  write("red.png", rgba_png(1, 1, {255, 0, 0, 255}));
+  write("a.mtl", "NEWMTL m\nmap_kd red.png\n");
+  EXPECT_TRUE(import("a.obj", obj + "f 1/1 2/1 3/1\n").notes.empty());
+  EXPECT_TRUE(has_note(import("a.obj", obj + "f 1 2 3\n"), "have a texture and no texture coordinates"));
+  EXPECT_TRUE(
+      has_note(import("a.obj", obj + "f 1/9 2/9 3/9\n"), "have a texture and no texture coordinates"));
+}
+
+TEST_F(Variants, AMapOfOpacityPlacedOtherwiseIsNoted) {
+  write("red.png", rgba_png(1, 1, {255, 0, 0, 255}));
+  const std::string obj = "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n";
+  write("a.mtl", "newmtl m\nmap_Kd red.png\nmap_d -imfchan r red.png\n");
+  EXPECT_TRUE(import("a.obj", obj).notes.empty());
+  write("a.mtl", "newmtl m\nmap_Kd red.png\nmap_d -s 2 2 2 -imfchan r red.png\n");
+  EXPECT_TRUE(has_note(import("a.obj", obj), "a map_d is placed as the map_Kd beside it"));
+}
+
+TEST_F(Variants, GltfExtensionsThatNoListDeclaresAreNoted) {
+  Document document;
+  document.node(
+      {{"mesh", document.mesh({{"attributes", {{"POSITION", document.vec3(kTriangle)}}}, {"material", 0}})}});
+  document.root["materials"] = {{{"extensions",
+                                  {{"KHR_materials_transmission", {{"transmissionFactor", 1}}},
+                                   {"KHR_materials_emissive_strength", json::object()}}},
+                                 {"extras", {{"extensions", {{"MY_tool", 1}}}}}}};
+  const Mesh mesh = import("a.gltf", document.gltf());
+  EXPECT_EQ(mesh.notes.size(), 1u);
+  EXPECT_TRUE(has_note(mesh, "the extension KHR_materials_transmission is not read"));
+  document.root["materials"][0] = {{"alphaMode", "GLASS"}};
+  document.root["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = {
+      {"TRANSLATION", document.vec3({0, 0, 1})}, {"_COLOR", document.vec3({1, 0, 0})}};
+  const Mesh odd = import("a.gltf", document.gltf());
+  EXPECT_EQ(odd.notes.size(), 2u);
+  EXPECT_TRUE(has_note(odd, "the attribute _COLOR of instances is not read"));
+  EXPECT_TRUE(has_note(odd, "the alphaMode GLASS is not known, OPAQUE is taken for it"));
+}
+
+}  // namespace
