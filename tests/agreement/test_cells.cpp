@@ -140,6 +140,54 @@ TEST(Cells, ExactRaysAreThoseOfABvh) {
   EXPECT_TRUE(same_bits(trace(view(baked_room()), {0, 0}, rays), trace(view(bvh), {0, 0}, rays)));
 }
 
+// The room with walls of different colours and a striped floor, whose stripes lie in one plane, and a ball
+// with smooth normals: tables alone answer with surfaces that look right, too.
+TEST(Cells, AnswersLookRight) {
+  Mesh mesh = sphere(24);
+  const size_t ball = mesh.triangles.size();
+  for (size_t t = 0; t < ball; ++t)
+    for (int k = 0; k < 3; ++k)
+      mesh.normals[t][size_t(k)] = glm::normalize(mesh.positions[mesh.triangles[t][k]]);
+  add_walls(mesh);
+  mesh.materials.clear();
+  for (const glm::vec3 color : {glm::vec3(0.5f), glm::vec3(0.9f, 0.1f, 0.1f), glm::vec3(0.1f, 0.2f, 0.9f)})
+    mesh.materials.emplace_back().base_color = color;
+  for (size_t t = ball; t < mesh.triangles.size(); ++t) mesh.material_ids[t] = uint32_t((t - ball) / 2 % 3);
+  constexpr int kStripes = 16;
+  const float floor = -2.4f, width = 5.0f / kStripes;
+  for (int i = 0; i < kStripes; ++i) {
+    const float x = -2.5f + width * float(i);
+    const glm::vec3 a(x, -2.5f, floor), b(x + width, -2.5f, floor), c(x + width, 2.5f, floor),
+        d(x, 2.5f, floor);
+    add_triangle(mesh, a, b, c);
+    add_triangle(mesh, a, c, d);
+    mesh.material_ids.end()[-1] = mesh.material_ids.end()[-2] = uint32_t(1 + i % 2);
+  }
+  const lsp::Baked baked = bake(mesh, options_of_cells());
+  const lsp_scene scene = view(baked);
+  const std::vector<LspRay> rays = seen_rays(baked, 4096, 8);
+  const std::vector<LspHit> truth = trace(scene, {0, 0, 0, 0}, rays);
+  const std::vector<LspHit> answers = trace(scene, tables_but(100), rays);
+  std::vector<uint32_t> material(baked.header.primitive_count);
+  for (const LspTriangle& t : baked.triangles) material[t.primitive] = t.material;
+  size_t both = 0, wrong_color = 0, wrong_normal = 0, balls = 0;
+  for (size_t i = 0; i < rays.size(); ++i) {
+    if (truth[i].primitive == LSP_NONE || answers[i].primitive == LSP_NONE) continue;
+    ++both;
+    wrong_color += material[truth[i].primitive] != material[answers[i].primitive];
+    if (truth[i].primitive >= ball || answers[i].primitive >= ball) continue;
+    ++balls;
+    const lsp_float3 &n = truth[i].normal, &m = answers[i].normal;
+    wrong_normal += n.x * m.x + n.y * m.y + n.z * m.z < 0.966f;  // 15 degrees
+  }
+  const double color_share = double(wrong_color) / double(both),
+               normal_share = double(wrong_normal) / double(balls);
+  EXPECT_GT(both, 20000u);
+  EXPECT_GT(balls, 1000u);
+  EXPECT_LT(color_share, 0.02);
+  EXPECT_LT(normal_share, 0.05);
+}
+
 TEST(Cells, AnswersLieInTheInterval) {
   const lsp_scene scene = view(baked_room());
   std::vector<LspRay> rays = surface_rays(baked_room(), 4000, 1);

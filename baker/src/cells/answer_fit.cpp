@@ -123,6 +123,12 @@ LSP_CLONES void normal_equations(const ShaftSamples& s, const float* first, cons
 
 }  // namespace
 
+float unlike(const Plane& a, const Plane& b) {
+  const glm::vec3 off = glm::abs(a.color - b.color);
+  const float turned = 1 - std::fabs(glm::dot(a.normal, b.normal));
+  return std::min(1.0f, std::max({off.x, off.y, off.z}) + turned);
+}
+
 // In lanes of four, the last of which is of the samples that only measure.
 AnswerFit::Sums AnswerFit::sums(const float* losses) const {
   float lanes[kHeldOut] = {};
@@ -176,6 +182,34 @@ void AnswerFit::add_candidates(std::span<const Plane> planes, bool near) {
   for (size_t c = 1; c < candidates_.size(); ++c)
     plane_losses(s, planes[candidates_[c]], near ? 0.0f : -LSP_CELL_SLACK, options_.depth_weight, 1 / size_,
                  &losses_[c * count_]);
+  if (options_.look_weight > 0) add_looks(planes);
+}
+
+// To a candidate's losses, where it is met in place of another plane.
+void AnswerFit::add_looks(std::span<const Plane> planes) {
+  const uint32_t* plane = samples_->plane;
+  met_.clear();
+  kinds_.resize(count_);
+  for (size_t i = 0; i < count_; ++i) {
+    size_t k = i > 0 && plane[i] == plane[i - 1] ? kinds_[i - 1] : 0;
+    while (k < met_.size() && met_[k] != plane[i]) ++k;
+    if (k == met_.size()) met_.push_back(plane[i]);
+    kinds_[i] = uint32_t(k);
+  }
+  unlike_.resize(met_.size());
+  for (size_t c = 1; c < candidates_.size(); ++c) {
+    if (candidates_[c] == kNoPlane) continue;
+    float most = 0;
+    for (size_t k = 0; k < met_.size(); ++k) {
+      unlike_[k] = met_[k] == kNoPlane || met_[k] == candidates_[c]
+                       ? 0
+                       : options_.look_weight * unlike(planes[candidates_[c]], planes[met_[k]]);
+      most = std::max(most, unlike_[k]);
+    }
+    if (most == 0) continue;
+    float* losses = &losses_[c * count_];
+    for (size_t i = 0; i < count_; ++i) losses[i] = std::min(1.0f, losses[i] + unlike_[kinds_[i]]);
+  }
 }
 
 Answer AnswerFit::choose(std::span<const Plane> planes, const ShaftSamples& samples, bool near) {

@@ -30,22 +30,28 @@ struct ShaftSamples {
 };
 
 struct Plane {
-  glm::vec3 normal;  // unit length
-  float distance;    // from the cell's centre along the normal
+  glm::vec3 normal;    // unit length
+  float distance;      // from the cell's centre along the normal
+  glm::vec3 color{0};  // base colour and emission of what lies in it
 };
+
+// From 0, the same, to 1: how wrong the light is that comes back from one in place of the other, the place
+// being the same. Which side is the front does not matter.
+float unlike(const Plane& a, const Plane& b);
 
 // An answer: nothing (kNoPlane), a plane, or a split between two of these.
 struct Answer {
   bool split = false;
   uint32_t a = kNoPlane, b = kNoPlane;        // of a split: where the form is positive, and where not
   std::array<int8_t, kPlaces + 1> weights{};  // of the places and 1, up to kSplitWeight in size
-  float loss = 0;  // share of the rays answered wrongly, as measured in part on rays that chose nothing
+  float loss = 0;  // share of the rays answered wrongly, by FitOptions, in part of rays that chose nothing
 };
 
 struct FitOptions {
   bool splits = true;
-  float depth_weight =
-      0.25f;  // of a depth error of a quarter of a cell's edge and more, against a wrong answer
+  // Against a wrong answer:
+  float depth_weight = 0.25f;  // of a depth error of a quarter of a cell's edge and more
+  float look_weight = 1.0f;    // of a surface that looks entirely different; 0: looks do not matter
 };
 
 constexpr int kSplitWeight = 31;
@@ -65,6 +71,7 @@ class AnswerFit {
   };
   Sums sums(const float* losses) const;
   void add_candidates(std::span<const Plane> planes, bool near);
+  void add_looks(std::span<const Plane> planes);
   float fit_split(const float* first, const float* second, Answer& answer);
   // Into chosen_: what each sample loses by a split.
   void chosen(const std::array<int8_t, kPlaces + 1>& weights, const float* first, const float* second);
@@ -75,8 +82,11 @@ class AnswerFit {
   size_t count_ = 0;
   bool held_out_ = false;
   std::vector<uint32_t> candidates_;
-  std::vector<float> losses_;  // by candidate and sample
-  std::vector<float> chosen_;  // of a split that is tried, by sample
+  std::vector<float> losses_;    // by candidate and sample
+  std::vector<uint32_t> met_;    // the planes that the samples meet, each once
+  std::vector<uint32_t> kinds_;  // by sample: its plane's index in met_
+  std::vector<float> unlike_;    // by candidate's and met plane
+  std::vector<float> chosen_;    // of a split that is tried, by sample
 };
 
 }  // namespace lsp

@@ -10,15 +10,17 @@ namespace {
 
 constexpr float kSameDirection = 0.9999f;
 constexpr float kSameDistance = 1e-3f;  // of a cell's edge
+constexpr float kSameLook = 0.02f;
 
 // Splits are numbered behind the planes, whose number is not known yet: from kSplits on for now.
 constexpr uint32_t kSplits = 0x1000, kTooMany = UINT32_MAX;
 
 }  // namespace
 
-CellAnswers::CellAnswers(std::span<const LspTriangle> triangles, std::span<const uint32_t> records,
-                         const glm::vec3& centre, float cell_size)
+CellAnswers::CellAnswers(std::span<const LspTriangle> triangles, std::span<const glm::vec3> colors,
+                         std::span<const uint32_t> records, const glm::vec3& centre, float cell_size)
     : triangles_(triangles),
+      colors_(colors),
       records_(records),
       centre_(centre),
       size_(cell_size),
@@ -32,11 +34,12 @@ uint32_t CellAnswers::plane_of(uint32_t triangle) {
   const glm::dvec3 area = glm::cross(b - a, c - a);
   const double length = glm::length(area);
   const glm::dvec3 normal = length > 0 ? area / length : glm::dvec3(0, 0, 1);
-  const Plane plane = {glm::vec3(normal), float(glm::dot(normal, a - glm::dvec3(centre_)))};
+  const Plane plane = {glm::vec3(normal), float(glm::dot(normal, a - glm::dvec3(centre_))),
+                       colors_.empty() ? glm::vec3(0) : colors_[t.material]};
   for (uint32_t k = 0; k < planes_.size(); ++k) {
     if ((triangles_[plane_records_[k]].flags ^ t.flags) >> LSP_TRIANGLE_GAPS_SHIFT != 0) continue;
     const float same = glm::dot(planes_[k].normal, plane.normal);
-    if (std::fabs(same) > kSameDirection &&
+    if (std::fabs(same) > kSameDirection && unlike(planes_[k], plane) < kSameLook &&
         std::fabs(planes_[k].distance - std::copysign(plane.distance, plane.distance * same)) <
             kSameDistance * size_)
       return found = k;

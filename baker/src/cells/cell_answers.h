@@ -14,11 +14,13 @@ namespace lsp {
 class CellAnswers {
  public:
   // `records` are the cell's triangles, in world space; planes are seen from the cell's centre.
-  CellAnswers(std::span<const LspTriangle> triangles, std::span<const uint32_t> records,
-              const glm::vec3& centre, float cell_size);
+  // `colors` are those of materials, see Plane; empty: looks do not matter.
+  CellAnswers(std::span<const LspTriangle> triangles, std::span<const glm::vec3> colors,
+              std::span<const uint32_t> records, const glm::vec3& centre, float cell_size);
 
-  // The plane of a triangle, which counts within the cell; those of coplanar ones with the same gaps are one.
-  // Which rays pass a triangle with gaps the tracer decides: to tables all are solid.
+  // The plane of a triangle, which counts within the cell; those of coplanar ones of about the same colour
+  // and with the same gaps are one. Which rays pass a triangle with gaps the tracer decides: to tables all
+  // are solid.
   uint32_t plane_of(uint32_t triangle);
   std::span<const Plane> planes() const { return planes_; }
 
@@ -35,6 +37,7 @@ class CellAnswers {
   uint32_t number_of(const Answer& answer);
 
   std::span<const LspTriangle> triangles_;
+  std::span<const glm::vec3> colors_;
   std::span<const uint32_t> records_;
   glm::vec3 centre_;
   float size_;

@@ -109,6 +109,13 @@ struct Row {
   }
 };
 
+FitOptions fit_options(const CellScene& scene) {
+  FitOptions options;
+  options.splits = scene.options.splits;
+  if (scene.colors.empty()) options.look_weight = 0;
+  return options;
+}
+
 struct LineHits {
   std::vector<float> t;
   std::vector<uint32_t> records;
@@ -150,8 +157,8 @@ class Filler {
         lo_(scene.grid.corner(cell_.at)),
         centre_(lo_ + 0.5f * size_),
         records_(std::span(scene.grid.records).subspan(cell_.first, cell_.count)),
-        answers_(scene.triangles, records_, centre_, size_),
-        fit_({scene.options.splits}, size_),
+        answers_(scene.triangles, scene.colors, records_, centre_, size_),
+        fit_(fit_options(scene), size_),
         row_(size_t(scene.options.far_patches) * scene.options.far_patches,
              std::max(kBeforeEmpty, scene.options.far_samples)) {
     build_tree();

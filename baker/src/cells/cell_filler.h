@@ -13,6 +13,7 @@ struct CellScene {
   const CellGrid& grid;
   const lsp_scene& whole;  // triangles' primitives are records
   std::span<const LspTriangle> triangles;
+  std::span<const glm::vec3> colors;  // of materials, see Plane; empty: looks do not matter
   const CellTableOptions& options;
   float offset;  // of ray origins from the surface, world space
 };

@@ -57,8 +57,8 @@ uint32_t loss_class(float loss) {
 }
 
 CellTables fill_cell_tables(const CellGrid& grid, const Bvh& bvh, const LspHeader& header,
-                            std::span<const LspTriangle> triangles, const CellTableOptions& options,
-                            const std::function<void(double)>& progress) {
+                            std::span<const LspTriangle> triangles, std::span<const LspMaterial> materials,
+                            const CellTableOptions& options, const std::function<void(double)>& progress) {
   std::vector<LspTriangle> numbered(triangles.begin(), triangles.end());
   for (size_t i = 0; i < numbered.size(); ++i) numbered[i].primitive = uint32_t(i);
   LspHeader whole_header = header;
@@ -71,7 +71,9 @@ CellTables fill_cell_tables(const CellGrid& grid, const Bvh& bvh, const LspHeade
   whole.nodes = bvh.nodes.data();
   whole.triangles = numbered.data();
   const float diagonal = glm::length(vec(header.bounds_max) - vec(header.bounds_min));
-  const CellScene scene{grid, whole, numbered, options, kOffset * diagonal};
+  std::vector<glm::vec3> colors;
+  for (const LspMaterial& m : materials) colors.push_back(vec(m.base_color) + vec(m.emission));
+  const CellScene scene{grid, whole, numbered, colors, options, kOffset * diagonal};
 
   CellTables out;
   uint64_t entries = 0;

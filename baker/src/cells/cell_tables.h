@@ -38,7 +38,8 @@ struct CellTables {
 // Fills the tables of all cells of the grid on all threads of the current oneTBB arena; the result does not
 // depend on their number.
 CellTables fill_cell_tables(const CellGrid& grid, const Bvh& bvh, const LspHeader& header,
-                            std::span<const LspTriangle> triangles, const CellTableOptions& options,
+                            std::span<const LspTriangle> triangles, std::span<const LspMaterial> materials,
+                            const CellTableOptions& options,
                             const std::function<void(double)>& progress = {});
 
 // Writes what the header states of grid and tables, but for the dial.

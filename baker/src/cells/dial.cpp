@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "../surface_rays.h"
+#include "../vectors.h"
 
 namespace lsp {
 namespace {
@@ -23,6 +24,7 @@ struct DialError {
   double wrong = 0;    // share of the rays answered wrongly
   double depth = 0;    // mean error of the distance where both hit, in diagonals
   double picture = 0;  // of ambient occlusion, over its mean or 0.25: the worse of a short and a long radius
+  double light = 0;    // of the light that comes back to a point, over its mean
   double cost = 0;     // of a ray: steps, look-ups and exact traces
 };
 
@@ -53,74 +55,134 @@ double open_share(const LspHit* hits, double radius) {
   return double(open) / kPerPoint;
 }
 
-DialError measure(const lsp_scene& scene, const Rays& set, double diagonal) {
-  lsp_trace_counts counts{};
-  const std::vector<LspHit> hits = trace(scene, {LSP_TRACE_APPROXIMATE, 0, 0, 0}, set.rays, &counts);
-  DialError error;
-  size_t wrong = 0, both = 0;
-  double depth = 0;
-  for (size_t i = 0; i < hits.size(); ++i) {
-    const bool answer = hits[i].primitive != LSP_NONE, truth = set.truth[i].primitive != LSP_NONE;
-    wrong += answer != truth;
-    if (!answer || !truth) continue;
-    ++both;
-    depth += std::fabs(double(hits[i].t) - double(set.truth[i].t));
+// Sums over points of what is true and of how far off the answer is.
+struct Measured {
+  double truth = 0, off = 0;
+  void add(double t, double a) {
+    truth += t;
+    off += std::fabs(a - t);
   }
-  const double rays = double(std::max<size_t>(1, hits.size()));
-  error.wrong = double(wrong) / rays;
-  error.depth = both ? depth / double(both) / diagonal : 0;
-  for (double radius : kRadii) {
-    double sum = 0, off = 0;
-    const size_t points = hits.size() / kPerPoint;
-    for (size_t p = 0; p < points; ++p) {
-      const double truth = open_share(&set.truth[p * kPerPoint], radius * diagonal);
-      sum += truth;
-      off += std::fabs(open_share(&hits[p * kPerPoint], radius * diagonal) - truth);
-    }
-    const double mean = sum / double(std::max<size_t>(1, points));
-    error.picture = std::max(error.picture, off / double(std::max<size_t>(1, points)) / std::max(0.25, mean));
-  }
-  error.cost = (double(counts.nodes) + kLookUp * double(counts.shafts) + kExact * double(counts.exact) +
-                kExactNode * double(counts.exact_nodes) + kTriangle * double(counts.triangles)) /
-               rays;
-  return error;
-}
+};
 
-bool within(const DialError& e, double wrong) {
-  return e.wrong <= wrong && e.depth <= wrong && e.picture <= 3 * wrong;
-}
-
-// The cheapest dial that keeps within errors, or the finest. The more of the origin tables is heeded, the
-// less of the far tables can be: a walk along the border of what is within. Tries dials in the header's
-// `balanced`.
-uint32_t cheapest(const lsp_scene& scene, LspHeader& header, const std::array<Rays, 2>& sets, double diagonal,
-                  double wrong) {
-  // What nobody knows is never heeded: rays of other places than these may come there.
-  constexpr uint32_t kClasses[] = {0, 1, 2, 3, 4, 5, 6, LSP_LOSS_UNKNOWN};
-  uint32_t best = LSP_DIAL(0u, 0u);
-  double least = INFINITY;
-  for (size_t near = 0, far = std::size(kClasses); near < std::size(kClasses) && far > 0;) {
-    const uint32_t dial = LSP_DIAL(kClasses[near], kClasses[far - 1]);
-    header.quality[LSP_QUALITY_BALANCED] = dial;
-    double cost = 0;
-    bool kept = true;
-    for (const Rays& set : sets) {
-      const DialError error = measure(scene, set, diagonal);
-      cost = std::max(cost, error.cost);
-      kept = kept && within(error, wrong);
-      if (!kept) break;
+// Tries dials, in the header's `balanced`.
+class Dial {
+ public:
+  explicit Dial(Baked& baked)
+      : header_(baked.header), scene_(view(baked)), diagonal_(diagonal(baked.header)) {
+    for (const LspMaterial& m : baked.materials) {
+      const glm::vec3 color = vec(m.base_color) + vec(m.emission);
+      brightness_.push_back((color.x + color.y + color.z) / 3);
     }
-    if (kept && cost < least) {
-      least = cost;
-      best = dial;
-    }
-    if (kept)
-      ++near;
-    else
-      --far;
+    material_.resize(header_.primitive_count);
+    for (const LspTriangle& t : baked.triangles) material_[t.primitive] = t.material;
+    sets_[0].rays = surface_rays(baked, kPoints, kPerPoint);
+    sets_[1].rays = seen_rays(baked, kPoints, kPerPoint);
+    lsp_trace_counts ignored{};
+    for (Rays& set : sets_) set.truth = trace(scene_, {0, 0, 0, 0}, set.rays, &ignored);
   }
-  return best;
-}
+
+  // The cheapest dial that keeps within errors, or the finest. The more of the origin tables is heeded, the
+  // less of the far tables can be: a walk along the border of what is within.
+  uint32_t cheapest(double wrong) {
+    // What nobody knows is never heeded: rays of other places than these may come there.
+    constexpr uint32_t kClasses[] = {0, 1, 2, 3, 4, 5, 6, LSP_LOSS_UNKNOWN};
+    uint32_t best = LSP_DIAL(0u, 0u);
+    double least = INFINITY;
+    for (size_t near = 0, far = std::size(kClasses); near < std::size(kClasses) && far > 0;) {
+      const uint32_t dial = LSP_DIAL(kClasses[near], kClasses[far - 1]);
+      header_.quality[LSP_QUALITY_BALANCED] = dial;
+      double cost = 0;
+      bool kept = true;
+      for (const Rays& set : sets_) {
+        const DialError error = measure(set);
+        cost = std::max(cost, error.cost);
+        kept = kept && within(error, wrong);
+        if (!kept) break;
+      }
+      if (kept && cost < least) {
+        least = cost;
+        best = dial;
+      }
+      if (kept)
+        ++near;
+      else
+        --far;
+    }
+    return best;
+  }
+
+ private:
+  static double diagonal(const LspHeader& h) {
+    return glm::length(glm::dvec3(h.bounds_max.x, h.bounds_max.y, h.bounds_max.z) -
+                       glm::dvec3(h.bounds_min.x, h.bounds_min.y, h.bounds_min.z));
+  }
+  static bool within(const DialError& e, double wrong) {
+    return e.wrong <= wrong && e.depth <= wrong && e.picture <= 3 * wrong && e.light <= 4 * wrong;
+  }
+
+  // The light that comes to a point by its rays: from the sky, and from what they meet, lit from one side,
+  // another one for each point. There are no shadows in it: it is the surface that counts.
+  double light_at(const LspRay* rays, const LspHit* hits, size_t point) const {
+    constexpr float kSide = 0.57735f;
+    const glm::vec3 towards(point & 1 ? kSide : -kSide, point & 2 ? kSide : -kSide,
+                            point & 4 ? kSide : -kSide);
+    double sum = 0;
+    for (uint32_t k = 0; k < kPerPoint; ++k) {
+      const LspHit& hit = hits[k];
+      if (hit.primitive == LSP_NONE) {
+        sum += 1;
+        continue;
+      }
+      const float front = glm::dot(vec(hit.normal), vec(rays[k].direction)) > 0 ? -1.0f : 1.0f;
+      const float lit = 0.5f + 0.5f * front * glm::dot(vec(hit.normal), towards);
+      sum += double(brightness_[material_[hit.primitive]] * lit);
+    }
+    return sum / kPerPoint;
+  }
+
+  DialError measure(const Rays& set) const {
+    lsp_trace_counts counts{};
+    const std::vector<LspHit> hits = trace(scene_, {LSP_TRACE_APPROXIMATE, 0, 0, 0}, set.rays, &counts);
+    DialError error;
+    size_t wrong = 0, both = 0;
+    double depth = 0;
+    for (size_t i = 0; i < hits.size(); ++i) {
+      const bool answer = hits[i].primitive != LSP_NONE, truth = set.truth[i].primitive != LSP_NONE;
+      wrong += answer != truth;
+      if (!answer || !truth) continue;
+      ++both;
+      depth += std::fabs(double(hits[i].t) - double(set.truth[i].t));
+    }
+    const double rays = double(std::max<size_t>(1, hits.size()));
+    error.wrong = double(wrong) / rays;
+    error.depth = both ? depth / double(both) / diagonal_ : 0;
+    const double points = double(std::max<size_t>(1, hits.size() / kPerPoint));
+    for (double radius : kRadii) {
+      Measured open;
+      for (size_t p = 0; p < hits.size(); p += kPerPoint)
+        open.add(open_share(&set.truth[p], radius * diagonal_), open_share(&hits[p], radius * diagonal_));
+      error.picture = std::max(error.picture, open.off / points / std::max(0.25, open.truth / points));
+    }
+    if (!brightness_.empty()) {
+      Measured light;
+      for (size_t p = 0; p < hits.size(); p += kPerPoint)
+        light.add(light_at(&set.rays[p], &set.truth[p], p / kPerPoint),
+                  light_at(&set.rays[p], &hits[p], p / kPerPoint));
+      error.light = light.truth > 0 ? light.off / light.truth : 0;
+    }
+    error.cost = (double(counts.nodes) + kLookUp * double(counts.shafts) + kExact * double(counts.exact) +
+                  kExactNode * double(counts.exact_nodes) + kTriangle * double(counts.triangles)) /
+                 rays;
+    return error;
+  }
+
+  LspHeader& header_;
+  const lsp_scene scene_;
+  const double diagonal_;
+  std::vector<float> brightness_;   // by material; empty: light does not count
+  std::vector<uint32_t> material_;  // by primitive
+  std::array<Rays, 2> sets_;
+};
 
 }  // namespace
 
@@ -128,17 +190,9 @@ void choose_dial(Baked& baked, double wrong) {
   LspHeader& h = baked.header;
   for (uint32_t& dial : h.quality) dial = LSP_DIAL_TABLES;
   if (baked.cell_tables.references.empty()) return;
-  const double diagonal = glm::length(glm::dvec3(h.bounds_max.x, h.bounds_max.y, h.bounds_max.z) -
-                                      glm::dvec3(h.bounds_min.x, h.bounds_min.y, h.bounds_min.z));
-  const lsp_scene scene = view(baked);
-  std::array<Rays, 2> sets;
-  sets[0].rays = surface_rays(baked, kPoints, kPerPoint);
-  sets[1].rays = seen_rays(baked, kPoints, kPerPoint);
-  lsp_trace_counts ignored{};
-  for (Rays& set : sets) set.truth = trace(scene, {0, 0, 0, 0}, set.rays, &ignored);
-
-  const uint32_t accurate = cheapest(scene, h, sets, diagonal, 0.5 * wrong);
-  h.quality[LSP_QUALITY_BALANCED] = cheapest(scene, h, sets, diagonal, wrong);
+  Dial dial(baked);
+  const uint32_t accurate = dial.cheapest(0.5 * wrong);
+  h.quality[LSP_QUALITY_BALANCED] = dial.cheapest(wrong);
   h.quality[LSP_QUALITY_ACCURATE] = accurate;
 }
 
