@@ -77,16 +77,21 @@ Exit run(Arguments a) {
   make_color_materials(mesh);
   const double import_seconds = timer();
 
-  auto [baked, error] =
-      bake_as_asked(mesh, a, [&](std::string_view stage, double done) { bar.show(stage, done); });
+  const WriteOptions write_options = {a.align, a.compress == "zstd", 12, a.memory_limit};
+  const auto meta_of = [&](const Chosen& c) {
+    return provenance(a, c.baked, mesh, material_names, source, c.error);
+  };
+  Chosen chosen = bake_as_asked(
+      mesh, a, [&](std::string_view stage, double done) { bar.show(stage, done); },
+      [&](Chosen& c) { return lsp_bytes(c.baked, meta_of(c).dump(), write_options); });
+  auto& [baked, error] = chosen;
   baked.header.source_hash_lo = source[0];
   baked.header.source_hash_hi = source[1];
   timer();
 
   bar.show("write", 0);
-  const Json meta = provenance(a, baked, mesh, material_names, source, error);
-  const Written written =
-      write_lsp(a.output, baked, meta.dump(), {a.align, a.compress == "zstd", 12, a.memory_limit});
+  const Json meta = meta_of(chosen);
+  const Written written = write_lsp(a.output, baked, meta.dump(), write_options);
   if (!a.depfile.empty()) write_depfile(a, mesh);
   const double write_seconds = timer();
   bar.clear();
@@ -127,6 +132,9 @@ int main(int argc, char** argv) {
                  "Choose the cheapest setting with at most this many per cent of rays answered wrongly, of "
                  "cells the point of the dial; 0: as --preset says")
       ->check(CLI::Range(0.0, 100.0));
+  app.add_option("--max-size", a.max_size,
+                 "The longest file, as 20MB: where it would be longer, a coarser grid of cells; 0: any")
+      ->transform(CLI::AsSizeValue(true));
   auto* resolution =
       app.add_option("--resolution", a.resolution, "N: patches along an edge of a Line Space's box")
           ->check(CLI::Range(1u, LSP_MAX_RESOLUTION));
@@ -186,7 +194,7 @@ int main(int argc, char** argv) {
   arrange_help(
       app, "lsp-bake room.gltf -o room.lsp --preset fast",
       {{"What most people need",
-        {"INPUT", "--output FILE", "--preset", "--max-error PERCENT", "--for", "--compress"}},
+        {"INPUT", "--output FILE", "--preset", "--max-error PERCENT", "--max-size", "--for", "--compress"}},
        {"Base structure", {"--base", "--cells", "--branching", "--levels", "--no-splits"}},
        {"Line Spaces",
         {"--resolution", "--depth", "--triangles", "--samples", "--normal-angle DEGREES", "--plane-tolerance",

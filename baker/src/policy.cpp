@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <map>
+#include <optional>
 
 #include "cells/dial.h"
 #include "lsp/program.h"
@@ -133,22 +134,8 @@ void leave_out_exact(Baked& baked, bool cells) {
     keep_approximate_only(baked);
 }
 
-}  // namespace
-
-void settle(Arguments& a) {
-  a.base = base_of(a);
-  check(a);
-  const Preset& preset = kPresets.at(a.preset);
-  const bool ntree = a.base == "ntree";
-  if (!a.resolution_given) a.resolution = preset.line_spaces.resolution;
-  if (ntree && !a.branching) a.branching = std::clamp(a.resolution, 2u, LSP_MAX_BRANCHING);
-  // At depth 1 an NTree's error costs the fewest bytes: bunny, N = 6, 1.2 % wrong and 13 MB against 0.3 % and
-  // 142 MB.
-  if (!a.depth_given) a.depths = {ntree ? std::min(a.levels - 1, 1u) : preset.line_spaces.depth};
-  if (!a.samples_given) a.samples = preset.line_spaces.samples;
-}
-
-Chosen bake_as_asked(const Mesh& mesh, Arguments& a, const Progress& progress) {
+// As bake_as_asked, whatever its size.
+Chosen bake_accurately(const Mesh& mesh, Arguments& a, const Progress& progress) {
   const bool cells = a.base == "cells";
   Chosen chosen;
   if (cells) {
@@ -171,6 +158,78 @@ Chosen bake_as_asked(const Mesh& mesh, Arguments& a, const Progress& progress) {
   }
   if (a.no_exact) leave_out_exact(chosen.baked, cells);
   return chosen;
+}
+
+[[noreturn]] void refuse_size(const Arguments& a, uint64_t bytes, const char* remedy) {
+  char text[200];
+  std::snprintf(text, sizeof text, "its smallest file is %.2f MB, over --max-size of %.2f MB: allow more%s",
+                double(bytes) * 1e-6, double(a.max_size) * 1e-6, remedy);
+  throw Failure(Exit::kLimit, a.inputs[0].string(), text);
+}
+
+// Of what depends on the grid.
+uint64_t table_bytes(const Baked& baked) {
+  const CellTables& t = baked.cell_tables;
+  const auto bytes = [](const auto& elements) { return uint64_t(elements.size() * sizeof(elements[0])); };
+  return bytes(baked.cell_grid.words) + bytes(t.cells) + bytes(t.entries) + bytes(t.planes) +
+         bytes(t.plane_records) + bytes(t.splits) + bytes(t.nodes) + bytes(t.references);
+}
+
+// The bake as it is asked for if its file is small enough, else that with the most cells on the longest side
+// of which this is so, or nearly: tables grow about with the square of it.
+Chosen bake_within(const Mesh& mesh, Arguments& a, const Progress& progress, const FileSize& file_size) {
+  constexpr int kBakes = 6;
+  constexpr double kFull = 0.9;  // of the size: no more is looked for
+  Chosen tried = bake_accurately(mesh, a, progress);
+  uint64_t bytes = file_size(tried);
+  if (bytes <= a.max_size) return tried;
+  if (a.base != "cells") refuse_size(a, bytes, ", or choose a smaller --depth or --resolution");
+  const bool chosen = a.cells == 0;
+  std::optional<Chosen> best;
+  const LspCellGrid& grid = tried.baked.header.cells;
+  uint32_t fits = 0, too_fine = std::max({grid.cells_x, grid.cells_y, grid.cells_z}), cells = too_fine;
+  double tables = double(table_bytes(tried.baked));
+  for (int bake = 1; chosen && bake < kBakes && too_fine - fits > 1; ++bake) {
+    const double left = double(a.max_size) - double(bytes) + tables;
+    if (left <= 0) break;
+    const auto next = uint32_t(double(cells) * std::sqrt(left / tables));
+    a.cells = cells = std::clamp(next, fits + 1, too_fine - 1);
+    tried = bake_accurately(mesh, a, progress);
+    bytes = file_size(tried);
+    tables = double(table_bytes(tried.baked));
+    if (bytes > a.max_size) {
+      too_fine = cells;
+      continue;
+    }
+    fits = cells;
+    best = std::move(tried);
+    if (double(bytes) > kFull * double(a.max_size)) break;
+  }
+  if (!best)
+    refuse_size(a, bytes,
+                a.no_exact ? ", or use --compress zstd"
+                           : ", leave out exact rays by --no-exact, or use --compress zstd");
+  a.cells = fits;
+  return std::move(*best);
+}
+
+}  // namespace
+
+void settle(Arguments& a) {
+  a.base = base_of(a);
+  check(a);
+  const Preset& preset = kPresets.at(a.preset);
+  const bool ntree = a.base == "ntree";
+  if (!a.resolution_given) a.resolution = preset.line_spaces.resolution;
+  if (ntree && !a.branching) a.branching = std::clamp(a.resolution, 2u, LSP_MAX_BRANCHING);
+  // At depth 1 an NTree's error costs the fewest bytes: bunny, N = 6, 1.2 % wrong and 13 MB against 0.3 % and
+  // 142 MB.
+  if (!a.depth_given) a.depths = {ntree ? std::min(a.levels - 1, 1u) : preset.line_spaces.depth};
+  if (!a.samples_given) a.samples = preset.line_spaces.samples;
+}
+
+Chosen bake_as_asked(const Mesh& mesh, Arguments& a, const Progress& progress, const FileSize& file_size) {
+  return a.max_size ? bake_within(mesh, a, progress, file_size) : bake_accurately(mesh, a, progress);
 }
 
 }  // namespace lsp

@@ -2,6 +2,8 @@
 // out.
 #pragma once
 
+#include <functional>
+
 #include "arguments.h"
 #include "error.h"
 
@@ -16,9 +18,13 @@ struct Chosen {
   MeasuredError error;
 };
 
+// How long the file of a bake would be, in bytes.
+using FileSize = std::function<uint64_t(Chosen&)>;
+
 // Bakes by the settings of `a`, which settle() has completed; with --max-error by the cheapest that err no
-// more, which `a` then states. Measures the error, then leaves out what --no-exact gives up. Throws Failure
-// with Exit::kLimit where no setting is accurate enough.
-Chosen bake_as_asked(const Mesh& mesh, Arguments& a, const Progress& progress);
+// more, with --max-size by the finest grid of cells whose file is no longer, which `a` then states. Measures
+// the error, then leaves out what --no-exact gives up. Throws Failure with Exit::kLimit where no setting is
+// accurate or small enough.
+Chosen bake_as_asked(const Mesh& mesh, Arguments& a, const Progress& progress, const FileSize& file_size);
 
 }  // namespace lsp

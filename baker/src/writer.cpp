@@ -145,10 +145,15 @@ std::vector<Section> sections_of(const Baked& baked, const std::string& meta) {
   return sections;
 }
 
-}  // namespace
+// A file but for its bytes on disk.
+struct Layout {
+  std::vector<Section> sections;
+  std::vector<LspSection> table;
+  std::vector<std::byte> head;  // header and table
+};
 
-Written write_lsp(const std::filesystem::path& path, Baked& baked, const std::string& meta,
-                  const WriteOptions& options) {
+// Packs the sections if asked to, gives them their places and completes the header.
+Layout lay_out(Baked& baked, const std::string& meta, const WriteOptions& options) {
   std::vector<Section> sections = sections_of(baked, meta);
   bool any_packed = false;
   if (options.zstd)
@@ -202,10 +207,22 @@ Written write_lsp(const std::filesystem::path& path, Baked& baked, const std::st
   h.header_hash_lo = header_hash.low64;
   h.header_hash_hi = header_hash.high64;
   std::memcpy(head.data(), &h, sizeof h);
+  return {std::move(sections), std::move(table), std::move(head)};
+}
 
+}  // namespace
+
+uint64_t lsp_bytes(Baked& baked, const std::string& meta, const WriteOptions& options) {
+  lay_out(baked, meta, options);
+  return baked.header.file_bytes;
+}
+
+Written write_lsp(const std::filesystem::path& path, Baked& baked, const std::string& meta,
+                  const WriteOptions& options) {
+  const auto [sections, table, head] = lay_out(baked, meta, options);
   TemporaryFile file(path);
   file.write(head.data(), head.size());
-  Written written{h.file_bytes, {}};
+  Written written{baked.header.file_bytes, {}};
   for (size_t i = 0; i < sections.size(); ++i) {
     file.pad_to(table[i].offset);
     for_each_piece(sections[i].stored(), sections[i].release,
@@ -213,7 +230,7 @@ Written write_lsp(const std::filesystem::path& path, Baked& baked, const std::st
     written.sections.push_back(
         {sections[i].known.name, sections[i].bytes.size(), sections[i].stored().size()});
   }
-  file.pad_to(h.file_bytes);
+  file.pad_to(baked.header.file_bytes);
   file.commit();
   return written;
 }

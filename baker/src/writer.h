@@ -35,6 +35,9 @@ struct Written {
 Written write_lsp(const std::filesystem::path& path, Baked& baked, const std::string& meta,
                   const WriteOptions& options);
 
+// How long that file will be, in bytes. Completes `baked.header`, too; packs where `options` say so.
+uint64_t lsp_bytes(Baked& baked, const std::string& meta, const WriteOptions& options);
+
 // Writes a small file of text in the same way.
 void write_text(const std::filesystem::path& path, const std::string& text);
 

@@ -132,6 +132,30 @@ TEST_F(LspBake, ExitsAsTheErrorIs) {
   EXPECT_EQ(run("--help"), 0);
 }
 
+TEST_F(LspBake, FilesAreNoLongerThanAskedFor) {
+  const auto grid_of = [&](const char* file) {
+    std::ostringstream command;
+    command << "cd '" << folder_.string() << "' && '" << LSP_BIN_DIR << "/lsp-info' --json " << file
+            << " >info";
+    EXPECT_EQ(std::system(command.str().c_str()), 0);
+    return nlohmann::json::parse(read("info"))["provenance"]["options"]["cells"].get<int>();
+  };
+  write_grid("hills.obj", 24);
+  ASSERT_EQ(run("hills.obj -o all.lsp --preset fast"), 0) << read("err");
+  const uint64_t all = fs::file_size(folder_ / "all.lsp"), half = all / 2;
+  ASSERT_EQ(run("hills.obj -o half.lsp --preset fast --max-size " + std::to_string(half)), 0) << read("err");
+  EXPECT_LE(fs::file_size(folder_ / "half.lsp"), half);
+  EXPECT_GT(fs::file_size(folder_ / "half.lsp"), half / 2);
+  EXPECT_LT(grid_of("half.lsp"), grid_of("all.lsp"));
+  ASSERT_EQ(run("hills.obj -o same.lsp --preset fast --max-size " + std::to_string(all)), 0) << read("err");
+  EXPECT_EQ(read("same.lsp"), read("all.lsp")) << "there was room";
+  EXPECT_EQ(run("hills.obj -o none.lsp --preset fast --max-size 100KB"), 6);
+  EXPECT_NE(read("err").find("hills.obj: its smallest file is"), std::string::npos) << read("err");
+  EXPECT_NE(read("err").find("--no-exact"), std::string::npos) << read("err");
+  EXPECT_FALSE(fs::exists(folder_ / "none.lsp"));
+  EXPECT_EQ(run("hills.obj -o none.lsp --base bvh --max-size 100KB"), 6);
+}
+
 TEST_F(LspBake, NotesAreInTheReportAndStrictRefusesThem) {
   ASSERT_EQ(run("grid.obj -o a.lsp --depth 3 --strict"), 0);
   std::ofstream(folder_ / "lines.obj") << read("grid.obj") << "l 1 2\n";
