@@ -162,7 +162,8 @@ Chosen bake_accurately(const Mesh& mesh, Arguments& a, const Progress& progress)
 
 [[noreturn]] void refuse_size(const Arguments& a, uint64_t bytes, const char* remedy) {
   char text[200];
-  std::snprintf(text, sizeof text, "its smallest file is %.2f MB, over --max-size of %.2f MB: allow more%s",
+  std::snprintf(text, sizeof text,
+                "needs a file of %.2f MB at least, over the %.2f MB of --max-size: allow more%s",
                 double(bytes) * 1e-6, double(a.max_size) * 1e-6, remedy);
   throw Failure(Exit::kLimit, a.inputs[0].string(), text);
 }
@@ -184,14 +185,17 @@ Chosen bake_within(const Mesh& mesh, Arguments& a, const Progress& progress, con
   uint64_t bytes = file_size(tried);
   if (bytes <= a.max_size) return tried;
   if (a.base != "cells") refuse_size(a, bytes, ", or choose a smaller --depth or --resolution");
-  const bool chosen = a.cells == 0;
+  if (a.cells) refuse_size(a, bytes, ", or choose fewer --cells");
   std::optional<Chosen> best;
   const LspCellGrid& grid = tried.baked.header.cells;
   uint32_t fits = 0, too_fine = std::max({grid.cells_x, grid.cells_y, grid.cells_z}), cells = too_fine;
   double tables = double(table_bytes(tried.baked));
-  for (int bake = 1; chosen && bake < kBakes && too_fine - fits > 1; ++bake) {
+  for (int bake = 1; bake < kBakes && too_fine - fits > 1; ++bake) {
     const double left = double(a.max_size) - double(bytes) + tables;
-    if (left <= 0) break;
+    if (left <= 0) {
+      bytes -= uint64_t(tables);  // no grid helps
+      break;
+    }
     const auto next = uint32_t(double(cells) * std::sqrt(left / tables));
     a.cells = cells = std::clamp(next, fits + 1, too_fine - 1);
     tried = bake_accurately(mesh, a, progress);
