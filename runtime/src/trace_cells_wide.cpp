@@ -18,8 +18,13 @@
 
 // Of Highway headers alone are used: what its library holds is the choice of a target, made below.
 #define HWY_IS_DEBUG_BUILD 0
-// For these, and for the one without vectors that Highway wants to have.
+// For these, and for the one without vectors that Highway wants to have. Under sanitizers, which take minutes to
+// compile each, one stands for all: they are the same text.
+#ifdef LSP_ONE_SIMD_TARGET
+#define HWY_DISABLED_TARGETS (~(HWY_AVX2 | HWY_NEON | HWY_EMU128 | HWY_SCALAR))
+#else
 #define HWY_DISABLED_TARGETS (~(HWY_AVX3 | HWY_AVX2 | HWY_SSE4 | HWY_NEON | HWY_EMU128 | HWY_SCALAR))
+#endif
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "trace_cells_wide.cpp"
 #include <hwy/foreach_target.h>
