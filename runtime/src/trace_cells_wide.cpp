@@ -193,9 +193,9 @@ struct Tracer {
     store(select(as_int(outside), side, set_i(LSP_NONE)), axis_ + i);
     const V3 p = point_at(o, load_3(direction_, i), begins);
     const VF half = set(0.5f);
-    store(hn::ConvertTo(di, min_of(max_of(p.x, zero), hn::Sub(dims.x, half))), cell_[0] + i);
-    store(hn::ConvertTo(di, min_of(max_of(p.y, zero), hn::Sub(dims.y, half))), cell_[1] + i);
-    store(hn::ConvertTo(di, min_of(max_of(p.z, zero), hn::Sub(dims.z, half))), cell_[2] + i);
+    store(hn::ConvertTo(di, min_of(max_of(zero, p.x), hn::Sub(dims.x, half))), cell_[0] + i);
+    store(hn::ConvertTo(di, min_of(max_of(zero, p.y), hn::Sub(dims.y, half))), cell_[1] + i);
+    store(hn::ConvertTo(di, min_of(max_of(zero, p.z), hn::Sub(dims.z, half))), cell_[2] + i);
   }
 
   // A vector of new rays at a time.

@@ -78,6 +78,30 @@ TEST(Loader, AgreesOnTheCorpus) {
 
 // What SPEC.md says a reader must refuse before it follows a reference. Each bounds a loop, a stack or a
 // range: a file that opened with more could keep a tracer, or a device, busy for as long as it likes.
+// Every number of a ray made of the same byte four times: zeros, the smallest and the largest, no numbers.
+// Where a ray meets the scene may then be no number either.
+TEST(Loader, AnyRayIsTraced) {
+  std::array<LspRay, 512> rays;
+  for (size_t i = 0; i < rays.size(); ++i) {
+    std::memset(&rays[i], int(i & 0xFF), sizeof rays[i]);
+    rays[i].tmin = i < 256 ? 0.0f : rays[i].tmin;
+    rays[i].tmax = INFINITY;
+  }
+  std::array<LspHit, 512> hits;
+  for (const ValidFile& file : valid_files()) {
+    const Opened opened = open(file.bytes);
+    if (opened.status != LSP_OK) continue;
+    for (uint32_t flags = 0; flags <= LSP_TRACE_ALL_FLAGS; ++flags) {
+      const lsp_trace_options options{flags, 0.0f};
+      if (lsp_trace(&opened.scene, &options, rays.data(), hits.data(), rays.size(), nullptr, nullptr) !=
+          LSP_OK)
+        continue;
+      for (const LspHit& hit : hits)
+        ASSERT_EQ(hit.flags & LSP_HIT_INCOMPLETE, 0u) << file.name << ", flags " << flags;
+    }
+  }
+}
+
 TEST(Loader, RefusesWhatAReaderMustRefuse) {
   const std::set<RuleId> rules = {
       RuleId::kTooShort,        RuleId::kBadMagic,     RuleId::kOtherMajor,     RuleId::kUnknownRequired,

@@ -94,9 +94,9 @@ LSP_STEP void lsp_begin(LspScene scene, LspSetup s, LspQuery q) {
   lsp_walk.t_last = lsp_min(lsp_min(lsp_min(last.x, last.y), last.z), s.tmax);
   lsp_walk.t = outside ? t_in : s.tmin;
   lsp_walk.axis = !outside ? -1 : (t_in == first.x ? 0 : (t_in == first.y ? 1 : 2));
-  vec3 p = lsp_cell_point(r, lsp_walk.t);
-  lsp_walk.cell = ivec3(int(lsp_min(lsp_max(p.x, 0.0f), dims.x - 0.5f)), int(lsp_min(lsp_max(p.y, 0.0f), dims.y - 0.5f)),
-                 int(lsp_min(lsp_max(p.z, 0.0f), dims.z - 0.5f)));
+  vec3 p = lsp_cell_point(r, lsp_walk.t); /* of a damaged file perhaps no number: then 0 is the larger */
+  lsp_walk.cell = ivec3(int(lsp_min(lsp_max(0.0f, p.x), dims.x - 0.5f)), int(lsp_min(lsp_max(0.0f, p.y), dims.y - 0.5f)),
+                 int(lsp_min(lsp_max(0.0f, p.z), dims.z - 0.5f)));
   lsp_walk.ref = lsp_walk.t < lsp_walk.t_last ? 0u : LSP_NONE;
   lsp_walk.exact_cell = lsp_walk.cell;
   lsp_walk.exact_t = lsp_walk.t;

@@ -18,7 +18,7 @@ LSP_BEGIN(LspHit)
   LSP_UINT primitive; /* in import order; LSP_NONE: no hit */
   LSP_FLOAT u;        /* weight of corner 1; outside [0, 1] where a plane was extrapolated */
   LSP_FLOAT v;        /* weight of corner 2 */
-  LSP_VEC3 normal;    /* unit shading normal, between those of the corners; it may face away from the ray */
+  LSP_VEC3 normal;    /* unit shading normal; it may face away from the ray */
   LSP_UINT flags;     /* LSP_HIT_* */
 LSP_END(LspHit)
 

@@ -642,10 +642,14 @@ LSP_FN LspHit lsp_finish(LspScene scene, LspSetup s, LspRay ray, LspBest best) {
   vec2 weights = vec2(best.u, best.v);
   if ((best.flags & LSP_HIT_LINE_SPACE) != 0u) weights = lsp_plane_weights(s, tri, best.t);
   if (lsp_has_normals(scene)) {
-    /* Beyond the triangle that of its nearest edge: extrapolated, it turns further than the surface does. */
-    float within_u = lsp_min(lsp_max(weights.x, 0.0f), 1.0f);
-    float within_v = lsp_min(lsp_max(weights.y, 0.0f), 1.0f - within_u);
-    vec3 smooth_n = lsp_interpolated_normal(scene, best.triangle, within_u, within_v);
+    vec2 at = weights;
+#ifdef LSP_CELLS
+    /* A plane stands for more of the surface here than a candidate does: beyond its triangle extrapolated normals turn
+     * further than the surface. */
+    at.x = lsp_min(lsp_max(at.x, 0.0f), 1.0f);
+    at.y = lsp_min(lsp_max(at.y, 0.0f), 1.0f - at.x);
+#endif
+    vec3 smooth_n = lsp_interpolated_normal(scene, best.triangle, at.x, at.y);
     if (lsp_dot(smooth_n, smooth_n) > 1e-12f) n = smooth_n;
   }
   /* A needle may have no area in single precision: then it faces the ray. */
