@@ -18,8 +18,8 @@
 
 // Of Highway headers alone are used: what its library holds is the choice of a target, made below.
 #define HWY_IS_DEBUG_BUILD 0
-// For these, and for the one without vectors that Highway wants to have. Under sanitizers, which take minutes to
-// compile each, one stands for all: they are the same text.
+// For these, and for the one without vectors that Highway wants to have. Under sanitizers, with which each
+// takes minutes to compile, one stands for all: they are the same text.
 #ifdef LSP_ONE_SIMD_TARGET
 #define HWY_DISABLED_TARGETS (~(HWY_AVX2 | HWY_NEON | HWY_EMU128 | HWY_SCALAR))
 #else
