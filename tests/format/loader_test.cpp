@@ -84,7 +84,9 @@ TEST(Loader, AnyRayIsTraced) {
   std::array<LspRay, 512> rays;
   for (size_t i = 0; i < rays.size(); ++i) {
     std::memset(&rays[i], int(i & 0xFF), sizeof rays[i]);
-    rays[i].tmin = i < 256 ? 0.0f : rays[i].tmin;
+    rays[i].tmin = 0;
+    lsp_float3& d = rays[i].direction;
+    if (i >= 256) d = {-d.x, -d.y, -d.z};  // back to where the scene is
     rays[i].tmax = INFINITY;
   }
   std::array<LspHit, 512> hits;
