@@ -101,6 +101,14 @@ TEST(Loader, AnyRayIsTraced) {
       for (const LspHit& hit : hits)
         ASSERT_EQ(hit.flags & LSP_HIT_INCOMPLETE, 0u) << file.name << ", flags " << flags;
     }
+    if (!(opened.scene.header->required_features & LSP_FEATURE_CELLS)) continue;
+    // So small cells that a ray's beginning is infinitely far away, counted in them.
+    LspHeader header = *opened.scene.header;
+    header.cells.per_size = 1e30f;
+    lsp_scene scene = opened.scene;
+    scene.header = &header;
+    const lsp_trace_options options{LSP_TRACE_APPROXIMATE, 0.0f};
+    EXPECT_EQ(lsp_trace(&scene, &options, rays.data(), hits.data(), rays.size(), nullptr, nullptr), LSP_OK);
   }
 }
 
