@@ -170,10 +170,12 @@ Chosen bake_accurately(const Mesh& mesh, Arguments& a, const Progress& progress)
 
 // Of what depends on the grid.
 uint64_t table_bytes(const Baked& baked) {
-  const CellTables& t = baked.cell_tables;
-  const auto bytes = [](const auto& elements) { return uint64_t(elements.size() * sizeof(elements[0])); };
-  return bytes(baked.cell_grid.words) + bytes(t.cells) + bytes(t.entries) + bytes(t.planes) +
-         bytes(t.plane_records) + bytes(t.splits) + bytes(t.nodes) + bytes(t.references);
+  const SectionArrays arrays{baked};
+  uint64_t bytes = 0;
+#define LSP_ARRAY_SECTION(Name, TYPE, code, Element, flag, base, feature, owed, member, ...) \
+  if (base == LSP_BASE_CELLS) bytes += uint64_t{arrays.member.size()} * sizeof(Element);
+#include "lsp/sections.def"
+  return bytes;
 }
 
 // The bake as it is asked for if its file is small enough, else that with the most cells on the longest side
@@ -187,8 +189,7 @@ Chosen bake_within(const Mesh& mesh, Arguments& a, const Progress& progress, con
   if (a.base != "cells") refuse_size(a, bytes, ", or choose a smaller --depth or --resolution");
   if (a.cells) refuse_size(a, bytes, ", or choose fewer --cells");
   std::optional<Chosen> best;
-  const LspCellGrid& grid = tried.baked.header.cells;
-  uint32_t fits = 0, too_fine = std::max({grid.cells_x, grid.cells_y, grid.cells_z}), cells = too_fine;
+  uint32_t fits = 0, too_fine = longest_side(tried.baked.header.cells), cells = too_fine;
   double tables = double(table_bytes(tried.baked));
   for (int bake = 1; bake < kBakes && too_fine - fits > 1; ++bake) {
     const double left = double(a.max_size) - double(bytes) + tables;

@@ -1,6 +1,5 @@
 #include "provenance.h"
 
-#include <algorithm>
 #include <cinttypes>
 #include <cstdio>
 #include <map>
@@ -79,10 +78,7 @@ Json provenance(const Arguments& a, const Baked& baked, const Mesh& mesh,
                {"source_hash", hex128(source[0], source[1])},
                {"options",
                 {{"base", a.base},
-                 {"cells", baked.header.cells.cells_x
-                               ? std::max({baked.header.cells.cells_x, baked.header.cells.cells_y,
-                                           baked.header.cells.cells_z})
-                               : 0},
+                 {"cells", longest_side(baked.header.cells)},
                  {"branching", a.branching},
                  {"levels", a.base == "ntree" ? a.levels : 0},
                  {"resolution", a.resolution},

@@ -198,7 +198,6 @@ void AnswerFit::add_looks(std::span<const Plane> planes) {
   }
   unlike_.resize(met_.size());
   for (size_t c = 1; c < candidates_.size(); ++c) {
-    if (candidates_[c] == kNoPlane) continue;
     float most = 0;
     for (size_t k = 0; k < met_.size(); ++k) {
       unlike_[k] = met_[k] == kNoPlane || met_[k] == candidates_[c]

@@ -2,6 +2,7 @@
 // part of the cell that holds surface, for rays that begin there.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -45,6 +46,11 @@ CellTables fill_cell_tables(const CellGrid& grid, const Bvh& bvh, const LspHeade
 // Writes what the header states of grid and tables, but for the dial.
 void set_cells(const CellGrid& grid, const CellTables& tables, const CellTableOptions& options,
                LspHeader& header);
+
+// The number of cells on the longest side; 0 where there are none.
+inline uint32_t longest_side(const LspCellGrid& grid) {
+  return std::max({grid.cells_x, grid.cells_y, grid.cells_z});
+}
 
 // The class of loss that an entry states for a share of wrong answers, see LSP_LOSS_*.
 uint32_t loss_class(float loss);
