@@ -197,7 +197,6 @@ void check_numbers(const LspHeader& header, Report& report) {
   bool zero = header.reserved_0 == 0;
   for (uint32_t word : header.reserved_1) zero = zero && word == 0;
   for (uint32_t word : header.cells.reserved) zero = zero && word == 0;
-  zero = zero && header.reserved_2 == 0;
   if (!zero) LSP_HEADER_FINDING(kReservedNotZero, reserved_1, "a reserved field is not zero");
 }
 

@@ -101,7 +101,7 @@ struct Fields<LspHeader> {
                                    LSP_FIELD(cell_node_count),
                                    LSP_FIELD(cell_reference_count),
                                    LSP_FIELD(quality),
-                                   LSP_FIELD(reserved_2)};
+                                   LSP_FIELD(wide_node_count)};
 };
 
 template <>
@@ -118,6 +118,13 @@ struct Fields<LspNode> {
   using Owner = LspNode;
   static constexpr Field list[] = {LSP_FIELD(lo0), LSP_FIELD(child0), LSP_FIELD(hi0), LSP_FIELD(line_space0),
                                    LSP_FIELD(lo1), LSP_FIELD(child1), LSP_FIELD(hi1), LSP_FIELD(line_space1)};
+};
+
+template <>
+struct Fields<LspWideNode> {
+  using Owner = LspWideNode;
+  static constexpr Field list[] = {LSP_FIELD(lo),             LSP_FIELD(node_first), LSP_FIELD(step),
+                                   LSP_FIELD(triangle_first), LSP_FIELD(children),   LSP_FIELD(planes)};
 };
 
 template <>
@@ -211,7 +218,7 @@ constexpr bool complete() {
 static_assert(complete<LspHeader>() && complete<LspSection>() && complete<LspNode>() && complete<LspCell>() &&
               complete<LspTriangle>() && complete<LspCornerNormals>() && complete<LspMaterial>() &&
               complete<LspLineSpace>() && complete<LspBitWord>() && complete<LspFilledCell>() &&
-              complete<LspPlane>() && complete<LspSplit>() && complete<LspCellNode>());
+              complete<LspPlane>() && complete<LspSplit>() && complete<LspCellNode>() && complete<LspWideNode>());
 
 constexpr Struct kStructs[] = {
     describe<LspHeader>("LspHeader"),     describe<LspSection>("LspSection"),
@@ -220,7 +227,7 @@ constexpr Struct kStructs[] = {
     describe<LspMaterial>("LspMaterial"), describe<LspLineSpace>("LspLineSpace"),
     describe<LspBitWord>("LspBitWord"),   describe<LspFilledCell>("LspFilledCell"),
     describe<LspPlane>("LspPlane"),       describe<LspSplit>("LspSplit"),
-    describe<LspCellNode>("LspCellNode"),
+    describe<LspCellNode>("LspCellNode"), describe<LspWideNode>("LspWideNode"),
 };
 
 template <class T>

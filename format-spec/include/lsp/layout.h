@@ -37,7 +37,7 @@ typedef struct lsp_float3 {
 
 /* Version of the format (not of the programs). A reader refuses another major version. */
 #define LSP_VERSION_MAJOR 2u
-#define LSP_VERSION_MINOR 2u
+#define LSP_VERSION_MINOR 3u
 
 /* First eight bytes: 89 'L' 'S' 'P' 0D 0A 1A 0A, as two little-endian words. Catches text-mode transfers. */
 #define LSP_MAGIC_0 0x50534C89u
@@ -54,16 +54,18 @@ typedef struct lsp_float3 {
 #define LSP_FEATURE_BINARY 0x20u     /* some Line Space has bits but no candidates */
 #define LSP_FEATURE_CELLS 0x40u      /* approximate rays are answered by cells */
 #define LSP_FEATURE_COVERAGE 0x80u   /* some triangle is there in part: LSP_TRIANGLE_GAPS_SHIFT */
-#define LSP_FEATURES_KNOWN 0xFFu
+#define LSP_FEATURE_WIDE 0x100u      /* exact rays walk wide nodes (WNOD); there is no NODE then */
+#define LSP_FEATURES_KNOWN 0x1FFu
 
 /* Base structures. */
 #define LSP_BASE_BVH 1u
 #define LSP_BASE_NTREE 2u
-#define LSP_BASE_CELLS 3u /* cells, and for exact rays a BVH */
+#define LSP_BASE_CELLS 3u /* cells, and for exact rays wide nodes, or (before 2.3) a BVH */
 
 #ifndef GL_core_profile
 /* The minor version to write: the lowest that knows these required features. */
 static inline uint32_t lsp_version_minor(uint32_t required_features) {
+  if ((required_features & LSP_FEATURE_WIDE) != 0) return 3u;
   return (required_features & LSP_FEATURE_COVERAGE) != 0 ? 1u : 0u;
 }
 
@@ -158,7 +160,7 @@ LSP_BEGIN(LspHeader)
   LSP_UINT bit_word_count;
   LSP_UINT candidate_word_count; /* 32-bit words of CAND */
   LSP_UINT material_count;
-  LSP_UINT max_depth;          /* edges from the root to the deepest leaf */
+  LSP_UINT max_depth;          /* edges from the root to the deepest leaf, of the nodes that the file has */
   LSP_UINT max_stack;          /* entries a traversal needs at most; <= LSP_MAX_STACK */
   LSP_UINT max_steps;          /* nodes and leaves a traversal visits at most; NTree: cells and references */
   LSP_UINT max_leaf_triangles; /* BVH: <= LSP_MAX_LEAF_TRIANGLES */
@@ -187,7 +189,7 @@ LSP_BEGIN(LspHeader)
   LSP_UINT cell_node_count;      /* LspCellNode */
   LSP_UINT cell_reference_count; /* of CREF */
   LSP_UINT quality[3]; /* LSP_QUALITY_*: LSP_DIAL of how many classes of loss are heeded */
-  LSP_UINT reserved_2; /* zero */
+  LSP_UINT wide_node_count; /* LspWideNode */
 LSP_END(LspHeader)
 
 /* Points of the dial between speed and accuracy that the bake measured for the scene: indices of header.quality. */
@@ -224,6 +226,27 @@ LSP_BEGIN(LspNode)
   LSP_VEC3 hi1;
   LSP_UINT line_space1;
 LSP_END(LspNode)
+
+/* A node of the tree for exact rays: up to eight children, whose boxes are bytes in the node's own frame, rounded
+ * outwards: plane q lies at lo + q * step. (Ylitie, Karras, Laine, "Efficient Incoherent Ray Traversal on GPUs Through
+ * Compressed Wide BVHs", 2017; here the steps are floats, not powers of two.) The first node is the root; a scene
+ * without triangles has none, and root in the header is LSP_NONE. Nodes that are children of one node follow one another, and blocks of them depth
+ * first; so do the triangles of a node's leaves, before those of the nodes below it. Any-hit rays take the children in
+ * their order. */
+LSP_BEGIN(LspWideNode)
+  LSP_VEC3 lo;
+  LSP_UINT node_first; /* children that are nodes count from here */
+  LSP_VEC3 step;
+  LSP_UINT triangle_first; /* the leaves' triangles count from here */
+  LSP_UINT children[4];    /* 16 bits each, the lower half first: LSP_WIDE_* */
+  LSP_UINT planes[12];     /* lo x, y, z, hi x, y, z: of each a byte a child, child 0 lowest, in two words */
+LSP_END(LspWideNode)
+#define LSP_WIDE_CHILDREN 8u
+/* A child: node node_first + its low bits; or a leaf, count - 1 in bits 11-14, its first triangle in bits 0-10. */
+#define LSP_WIDE_NODE_BIT 0x8000u
+#define LSP_WIDE_LEAF_COUNT_SHIFT 11u
+#define LSP_WIDE_LEAF_FIRST_MASK 0x7FFu
+#define LSP_WIDE_NO_CHILD 0xFFFFu /* its box is inside out: lo 255, hi 0 */
 
 /* A cell of an NTree node, the base structure in which a node is a cube cut into N^3 equal cubes (paper, section
  * 3.2). Nodes are numbered depth first, the root is 0; each has LSP_GRID_WORDS(N) words of GRID, in which bit
@@ -402,6 +425,7 @@ LSP_STATIC_ASSERT(sizeof(LspCellGrid) == 64);
 LSP_STATIC_ASSERT(sizeof(LspHeader) == 384);
 LSP_STATIC_ASSERT(sizeof(LspSection) == 64);
 LSP_STATIC_ASSERT(sizeof(LspNode) == 64);
+LSP_STATIC_ASSERT(sizeof(LspWideNode) == 96);
 LSP_STATIC_ASSERT(sizeof(LspCell) == 12);
 LSP_STATIC_ASSERT(sizeof(LspFilledCell) == 48);
 LSP_STATIC_ASSERT(sizeof(LspPlane) == 16);
