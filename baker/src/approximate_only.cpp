@@ -259,7 +259,7 @@ void keep_tables_only(Baked& baked) {
       with_commas(baked.triangles.size()));
   baked.triangles = std::move(triangles);
   baked.normals = std::move(normals);
-  baked.nodes.clear();
+  baked.wide = {};
   tables.nodes.clear();
   tables.references.clear();
   for (LspFilledCell& cell : tables.cells) {
@@ -267,7 +267,7 @@ void keep_tables_only(Baked& baked) {
     cell.node_first = cell.reference_first = cell.max_steps = 0;
   }
   LspHeader& h = baked.header;
-  h.required_features &= ~LSP_FEATURE_EXACT;
+  h.required_features &= ~(LSP_FEATURE_EXACT | LSP_FEATURE_WIDE);
   h.root = LSP_NONE;
   h.max_depth = h.max_steps = h.max_leaf_triangles = 0;
   h.max_stack = 1;

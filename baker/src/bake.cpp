@@ -60,13 +60,22 @@ void fill_triangles(const Mesh& mesh, const Bvh& bvh, bool normals, bool materia
   }
 }
 
-// What the header states of the BVH, which is there whatever the base structure is.
+// What the header states of the BVH.
 void set_bvh(const Bvh& bvh, LspHeader& h) {
   h.root = bvh.root;
   h.max_depth = bvh.max_depth;
   h.max_stack = std::max(1u, bvh.max_depth);
   h.max_steps = uint32_t(bvh.nodes.size()) + bvh.leaf_count + 1;
   h.max_leaf_triangles = bvh.max_leaf_triangles;
+}
+
+// Or, in place of it, of the wide nodes.
+void set_wide(const WideTree& wide, LspHeader& h) {
+  h.root = LSP_NONE;
+  h.max_depth = wide.max_depth;
+  h.max_stack = std::max(1u, wide.max_depth);
+  h.max_steps = wide.max_steps;
+  h.max_leaf_triangles = wide.max_leaf_triangles;
 }
 
 // What the header states of the scene and of how it is to be traced.
@@ -89,7 +98,8 @@ uint32_t features_of(const Baked& baked) {
       std::any_of(spaces.begin(), spaces.end(), [](const LspLineSpace& r) { return entry_bytes(r) == 0; });
   return LSP_FEATURE_EXACT | (spaces.empty() ? 0 : LSP_FEATURE_LINE_SPACES) |
          (baked.normals.empty() ? 0 : LSP_FEATURE_NORMALS) |
-         (baked.materials.empty() ? 0 : LSP_FEATURE_MATERIALS) | (binary ? LSP_FEATURE_BINARY : 0);
+         (baked.materials.empty() ? 0 : LSP_FEATURE_MATERIALS) | (binary ? LSP_FEATURE_BINARY : 0) |
+         (baked.wide.nodes.empty() ? 0 : LSP_FEATURE_WIDE);
 }
 
 // The bake's largest arrays at their largest.
@@ -180,6 +190,7 @@ Baked bake(const Mesh& mesh, const BakeOptions& asked, const Progress& progress)
   BvhOptions bvh_options = options.bvh;
   bvh_options.spatial_splits = bvh_options.spatial_splits && base.repeats_triangles;
   job.bvh = build_bvh(mesh, bvh_options, job.stage("base structure"));
+  if (base.has_wide_nodes) baked.wide = build_wide_tree(mesh, job.bvh);
   baked.tree_seconds = lap();
 
   const bool shading = options.purpose == Purpose::kDiffuse || options.purpose == Purpose::kGlossy ||
@@ -199,7 +210,10 @@ Baked bake(const Mesh& mesh, const BakeOptions& asked, const Progress& progress)
   for (const LspTriangle& t : baked.triangles)
     for (const lsp_float3& v : {t.v0, t.v1, t.v2}) job.bounds.grow({v.x, v.y, v.z});
   set_scene(mesh, options, job.bounds, baked.header);
-  set_bvh(job.bvh, baked.header);
+  if (base.has_wide_nodes)
+    set_wide(baked.wide, baked.header);
+  else
+    set_bvh(job.bvh, baked.header);
 
   lap();
   base.build(job);

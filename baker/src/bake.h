@@ -16,6 +16,7 @@
 #include "lsp/lsp.h"
 #include "mesh.h"
 #include "ntree.h"
+#include "wide_tree.h"
 
 namespace lsp {
 
@@ -51,8 +52,9 @@ struct BakeOptions {
 struct Baked {
   LspHeader header{};
   std::vector<LspNode> nodes;  // of a BVH
+  WideTree wide;               // of cells, for exact rays
   NTree ntree;                 // or of an NTree
-  CellGrid cell_grid;          // or cells, beside the BVH
+  CellGrid cell_grid;          // or cells
   CellTables cell_tables;
   std::vector<LspTriangle> triangles;
   std::vector<LspCornerNormals> normals;  // empty: no section
@@ -67,6 +69,7 @@ struct Baked {
 struct SectionArrays {
   const Baked& baked;
   const std::vector<LspNode>& nodes = baked.nodes;
+  const std::vector<LspWideNode>& wide_nodes = baked.wide.nodes;
   const std::vector<LspTriangle>& triangles = baked.triangles;
   const std::vector<LspCornerNormals>& normals = baked.normals;
   const std::vector<LspMaterial>& materials = baked.materials;

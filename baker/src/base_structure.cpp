@@ -85,16 +85,15 @@ void fill_cells(BakeJob& job) {
   const size_t cells = baked.cell_grid.words.size();
   baked.skipped.push_back("empty cells: " + with_commas(cells - baked.cell_tables.cells.size()) + " of " +
                           with_commas(cells));
-  baked.nodes = std::move(job.bvh.nodes);
 }
 
 void finish_cells(BakeJob& job) { choose_dial(job.baked, job.options.cells_wrong); }
 
-constexpr BaseStructure kBvh = {0, true, bvh_nodes_at, build_bvh_base, fill_bvh, nullptr};
+constexpr BaseStructure kBvh = {0, true, false, bvh_nodes_at, build_bvh_base, fill_bvh, nullptr};
 // It refers to triangles, so that none is repeated; the BVH orders them and fills the Line Spaces.
-constexpr BaseStructure kNTree = {LSP_FEATURE_NTREE, false,      ntree_nodes_at,
+constexpr BaseStructure kNTree = {LSP_FEATURE_NTREE, false, false, ntree_nodes_at,
                                   build_ntree_base,  fill_ntree, nullptr};
-constexpr BaseStructure kCells = {LSP_FEATURE_CELLS, true,       bvh_nodes_at,
+constexpr BaseStructure kCells = {LSP_FEATURE_CELLS, true, true, bvh_nodes_at,
                                   build_cells_base,  fill_cells, finish_cells};
 
 }  // namespace

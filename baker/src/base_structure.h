@@ -28,6 +28,7 @@ struct BakeJob {
 struct BaseStructure {
   uint32_t feature;        // LSP_FEATURE_*, 0: none of its own
   bool repeats_triangles;  // spatial splits may make several records of a triangle
+  bool has_wide_nodes;     // exact rays walk them, not the BVH
   // How many nodes may carry a Line Space at a depth, for an estimate of memory.
   uint64_t (*nodes_at)(const BakeOptions& options, uint32_t depth);
   void (*build)(BakeJob& job);   // the structure, and what the header states of it

@@ -99,6 +99,10 @@ lsp_status check_limits(const LspHeader& header, lsp_error* error) {
     return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, base_structure),
                 "states base structure %u, which its features contradict", header.base_structure);
   }
+  if ((header.required_features & LSP_FEATURE_WIDE) != 0 && base != LSP_BASE_CELLS) {
+    return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, required_features),
+                "has wide nodes, which base structure %u does not have", header.base_structure);
+  }
   if (!finite(header.bounds_min) || !finite(header.bounds_max) || !std::isfinite(header.normal_angle_cos) ||
       !std::isfinite(header.plane_tolerance)) {
     return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, bounds_min),
@@ -112,7 +116,8 @@ lsp_status check_limits(const LspHeader& header, lsp_error* error) {
   if (const lsp_status status = check_cells(header, error); status != LSP_OK) return status;
   // Every node and leaf is visited once at most, so a loop bounded by this ends soon even where nodes form a
   // ring.
-  const uint64_t steps = is_ntree(header) ? lsp_ntree_steps(&header) : 2 * uint64_t{header.node_count};
+  const uint64_t steps = is_ntree(header) ? lsp_ntree_steps(&header)
+                                          : 2 * uint64_t{header.node_count} + lsp_wide_steps(&header);
   if (header.max_steps > steps + kStepsSlack) {
     return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, max_steps),
                 "states %u steps of traversal, more than its %u nodes allow", header.max_steps,

@@ -7,6 +7,7 @@
 #include "trace_loops.h"
 #ifdef LSP_SIMD
 #include "trace_cells_wide.h"
+#include "trace_wide_lanes.h"
 #endif
 
 extern "C" uint32_t lsp_dial(const lsp_scene* scene, const lsp_trace_options* options) {
@@ -72,6 +73,19 @@ extern "C" lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options*
     lsp::TraceCells& trace = partial ? lsp::partial::trace_cells : lsp::solid::trace_cells;
     trace(*scene, (options->flags & LSP_TRACE_ANY_HIT) != 0, lsp_dial(scene, options), rays, hits, count,
           counts);
+    return LSP_OK;
+  }
+  if ((features & LSP_FEATURE_WIDE) != 0) {
+    const bool any_hit = (options->flags & LSP_TRACE_ANY_HIT) != 0;
+#ifdef LSP_SIMD
+    if (const lsp::WideExact* loop = !partial && counts == nullptr ? lsp::wide_exact() : nullptr;
+        loop != nullptr) {
+      loop->trace(*scene, any_hit, rays, hits, count);
+      return LSP_OK;
+    }
+#endif
+    const lsp::WideLoops& loops = partial ? lsp::partial::kWideLoops : lsp::solid::kWideLoops;
+    loops.of[any_hit ? 1 : 0](*scene, 0, rays, hits, count, counts);
     return LSP_OK;
   }
   uint32_t flags = options->flags & (approximate ? LSP_TRACE_ALL_FLAGS : LSP_TRACE_ANY_HIT);

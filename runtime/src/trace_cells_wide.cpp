@@ -16,15 +16,7 @@
 
 #include <limits>
 
-// Of Highway headers alone are used: what its library holds is the choice of a target, made below.
-#define HWY_IS_DEBUG_BUILD 0
-// For these, and for the one without vectors that Highway wants to have. Under sanitizers, with which each
-// takes minutes to compile, one stands for all: they are the same text.
-#ifdef LSP_ONE_SIMD_TARGET
-#define HWY_DISABLED_TARGETS (~(HWY_AVX2 | HWY_NEON | HWY_EMU128 | HWY_SCALAR))
-#else
-#define HWY_DISABLED_TARGETS (~(HWY_AVX3 | HWY_AVX2 | HWY_SSE4 | HWY_NEON | HWY_EMU128 | HWY_SCALAR))
-#endif
+#include "simd_targets.h"
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "trace_cells_wide.cpp"
 #include <hwy/foreach_target.h>
@@ -623,29 +615,6 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace lsp {
-namespace {
-
-#if HWY_TARGETS & HWY_AVX3
-bool has_avx3() {
-  return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
-         __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw") &&
-         __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi2") && __builtin_cpu_supports("fma");
-}
-#endif
-#if HWY_TARGETS & HWY_AVX2
-bool has_avx2() {
-  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2") &&
-         __builtin_cpu_supports("fma");
-}
-#endif
-#if HWY_TARGETS & HWY_SSE4
-bool has_sse4() { return __builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("popcnt"); }
-#endif
-#if HWY_TARGETS & HWY_NEON
-bool has_neon() { return true; }
-#endif
-
-}  // namespace
 
 const WideCells kWideCells[] = {
 #if HWY_TARGETS & HWY_AVX3

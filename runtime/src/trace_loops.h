@@ -14,12 +14,19 @@ struct TraceLoops {
   TraceLoop of[LSP_TRACE_ALL_FLAGS + 1];
 };
 
+// Of exact rays through wide nodes: for the closest hit, for any.
+struct WideLoops {
+  TraceLoop of[2];
+};
+
 // Of scenes whose triangles are solid, and of those where some are there in part.
 namespace solid {
 extern const TraceLoops kBvhLoops, kNTreeLoops;
+extern const WideLoops kWideLoops;
 }
 namespace partial {
 extern const TraceLoops kBvhLoops, kNTreeLoops;
+extern const WideLoops kWideLoops;
 }
 
 }  // namespace lsp

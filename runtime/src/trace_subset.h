@@ -26,6 +26,7 @@
 namespace lsp::subset {
 
 using glm::ivec3;
+using glm::uvec2;
 using glm::uvec4;
 using glm::vec2;
 using glm::vec3;
@@ -111,6 +112,20 @@ LSP_FN const LspCellNode& lsp_load_cell_node(LspScene scene, uint i) {
 }
 LSP_FN uint lsp_load_cell_reference(LspScene scene, uint i) {
   return at(scene.cell_references, i, scene.header->cell_reference_count);
+}
+
+LSP_FN const LspWideNode& lsp_load_wide_node(LspScene scene, uint i) {
+  return at(scene.wide_nodes, i, scene.header->wide_node_count);
+}
+// Of a wide node what names one of its children.
+struct LspWideChild {
+  uint node_first;
+  uint triangle_first;
+  uint bits;
+};
+LSP_FN LspWideChild lsp_load_wide_child(LspScene scene, uint i, uint number) {
+  const LspWideNode& node = lsp_load_wide_node(scene, i);
+  return {node.node_first, node.triangle_first, node.children[number >> 1u] >> ((number & 1u) * 16u) & 0xFFFFu};
 }
 
 // Asks for an element that is read later. It need not be there.

@@ -42,18 +42,33 @@ constexpr uint32_t kCellsAddressesCount[] =
 #include "trace_cells_addresses_count.spv.inc"
     ;
 
+constexpr uint32_t kWide[] =
+#include "trace_wide.spv.inc"
+    ;
+constexpr uint32_t kWideCount[] =
+#include "trace_wide_count.spv.inc"
+    ;
+constexpr uint32_t kWideAddresses[] =
+#include "trace_wide_addresses.spv.inc"
+    ;
+constexpr uint32_t kWideAddressesCount[] =
+#include "trace_wide_addresses_count.spv.inc"
+    ;
+
 struct Spirv {
   const uint32_t* words;
   size_t bytes;
 };
 // By base structure, addresses, counting.
-constexpr Spirv kShaders[3][2][2] = {
+constexpr Spirv kShaders[4][2][2] = {
     {{{kBvh, sizeof kBvh}, {kBvhCount, sizeof kBvhCount}},
      {{kBvhAddresses, sizeof kBvhAddresses}, {kBvhAddressesCount, sizeof kBvhAddressesCount}}},
     {{{kNTree, sizeof kNTree}, {kNTreeCount, sizeof kNTreeCount}},
      {{kNTreeAddresses, sizeof kNTreeAddresses}, {kNTreeAddressesCount, sizeof kNTreeAddressesCount}}},
     {{{kCells, sizeof kCells}, {kCellsCount, sizeof kCellsCount}},
-     {{kCellsAddresses, sizeof kCellsAddresses}, {kCellsAddressesCount, sizeof kCellsAddressesCount}}}};
+     {{kCellsAddresses, sizeof kCellsAddresses}, {kCellsAddressesCount, sizeof kCellsAddressesCount}}},
+    {{{kWide, sizeof kWide}, {kWideCount, sizeof kWideCount}},
+     {{kWideAddresses, sizeof kWideAddresses}, {kWideAddressesCount, sizeof kWideAddressesCount}}}};
 
 template <class Function>
 bool load(VkDevice device, PFN_vkGetDeviceProcAddr get, const char* name, Function* function) {
@@ -96,7 +111,7 @@ extern "C" void lsp_vulkan_record_upload_barrier(const lsp_vulkan_functions* fun
 
 extern "C" const uint32_t* lsp_vulkan_trace_spirv(const lsp_vulkan_plan* plan, int counting, size_t* bytes) {
   const uint32_t base = plan->base_structure - LSP_BASE_BVH;
-  const Spirv& shader = kShaders[base < 3 ? base : 0][plan->addresses != 0][counting != 0];
+  const Spirv& shader = kShaders[base < 4 ? base : 0][plan->addresses != 0][counting != 0];
   *bytes = shader.bytes;
   return shader.words;
 }

@@ -183,8 +183,7 @@ class Pipelines {
     VkPipeline& pipeline = made_[{counting, flags, tables}];
     if (pipeline != VK_NULL_HANDLE) return pipeline;
     lsp_vulkan_plan plan = plan_;
-    if (plan.base_structure == LSP_BASE_CELLS && (flags & LSP_TRACE_APPROXIMATE) == 0)
-      plan.base_structure = LSP_BASE_BVH;
+    if ((flags & LSP_TRACE_APPROXIMATE) == 0) plan.base_structure = plan.exact_structure;
     return pipeline = shader_.create_pipeline(plan, counting, flags, stack_,
                                               tables ? parts_ & ~LSP_PART_CELL_EXACT : parts_);
   }

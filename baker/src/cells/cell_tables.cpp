@@ -65,6 +65,11 @@ CellTables fill_cell_tables(const CellGrid& grid, const Bvh& bvh, const LspHeade
   whole_header.base_structure = LSP_BASE_BVH;
   whole_header.required_features = LSP_FEATURE_EXACT;
   whole_header.node_count = uint32_t(bvh.nodes.size());
+  whole_header.wide_node_count = 0;
+  whole_header.root = bvh.root;
+  whole_header.max_depth = bvh.max_depth;
+  whole_header.max_stack = std::max(1u, bvh.max_depth);
+  whole_header.max_steps = uint32_t(bvh.nodes.size()) + bvh.leaf_count + 1;
   whole_header.triangle_count = uint32_t(triangles.size());
   lsp_scene whole{};
   whole.header = &whole_header;

@@ -248,6 +248,13 @@ LSP_END(LspWideNode)
 #define LSP_WIDE_LEAF_FIRST_MASK 0x7FFu
 #define LSP_WIDE_NO_CHILD 0xFFFFu /* its box is inside out: lo 255, hi 0 */
 
+#ifndef GL_core_profile
+/* What a traversal of wide nodes visits at most: nodes, and their leaves. */
+static inline uint64_t lsp_wide_steps(const LspHeader* h) {
+  return UINT64_C(1) * h->wide_node_count * (1 + LSP_WIDE_CHILDREN);
+}
+#endif
+
 /* A cell of an NTree node, the base structure in which a node is a cube cut into N^3 equal cubes (paper, section
  * 3.2). Nodes are numbered depth first, the root is 0; each has LSP_GRID_WORDS(N) words of GRID, in which bit
  * LSP_CELL_INDEX(x, y, z, N) is set when the cell holds something. The record of a filled cell is

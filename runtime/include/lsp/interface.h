@@ -57,7 +57,7 @@ LSP_END(LspHit)
 
 /* Bindings of its descriptor set, all storage buffers; 0 to 11 are those of lsp.glsl. */
 #define LSP_BINDING_HEADER 0
-#define LSP_BINDING_NODES 1 /* of an NTree: GRID; of scenes read through addresses: their table */
+#define LSP_BINDING_NODES 1 /* of an NTree: GRID; wide nodes; of scenes read through addresses: their table */
 #define LSP_BINDING_TRIANGLES 2
 #define LSP_BINDING_NORMALS 3
 #define LSP_BINDING_LINE_SPACES 4

@@ -6,6 +6,7 @@
  *   #define LSP_FIRST_BINDING 0      // binding of the header; the others follow it, default 0
  *   #define LSP_NTREE                // the scene's base structure is an NTree, not a BVH
  *   #define LSP_CELLS                // or it has cells, and the rays are approximate
+ *   #define LSP_WIDE                 // or exact, and the scene has wide nodes (LSP_FEATURE_WIDE)
  *   #define LSP_ADDRESSES            // sections are read through addresses, see lsp_addresses.glsl
  *   #include "lsp/lsp.glsl"
  *
@@ -17,6 +18,8 @@
  *   +0 header   +1 NODE   +2 TRIA   +3 NRML   +4 LSPC   +5 BITS   +6 CAND
  * of an NTree also
  *   +1 GRID   +7 CELL   +8 REFS
+ * with LSP_WIDE
+ *   +1 WNOD
  * and of cells, which have no Line Spaces,
  *   +4 CSPL   +5 CPLN   +6 CENT   +7 CGRD   +8 CREF   +9 CELT   +10 CPRC   +11 CNOD
  * A section the file does not have is bound to any buffer (the header's, say): it is not read.
@@ -76,6 +79,22 @@ uint lsp_entry_of(uint word, uint i) { return (word >> ((i & 1u) * 16u)) & 0xFFF
 LspPlane lsp_plane_of(uvec4 w) { return LspPlane(uintBitsToFloat(w.xyz), uintBitsToFloat(w.w)); }
 LspSplit lsp_split_of(uvec2 w) { return LspSplit(w.x, w.y); }
 LspCellNode lsp_cell_node_of(uvec4 w) { return LspCellNode(w.x, w.y, w.z, w.w); }
+
+LspWideNode lsp_wide_node_of(uvec4 a, uvec4 b, uvec4 c, uvec4 d, uvec4 e, uvec4 f) {
+  return LspWideNode(uintBitsToFloat(a.xyz), a.w, uintBitsToFloat(b.xyz), b.w, uint[4](c.x, c.y, c.z, c.w),
+                     uint[12](d.x, d.y, d.z, d.w, e.x, e.y, e.z, e.w, f.x, f.y, f.z, f.w));
+}
+
+/* Of a wide node what names one of its children. */
+struct LspWideChild {
+  uint node_first;
+  uint triangle_first;
+  uint bits; /* 16, of LspWideNode.children */
+};
+LspWideChild lsp_wide_child_of(uint node_first, uint triangle_first, uvec4 children, uint number) {
+  uint pair = number < 4u ? (number < 2u ? children.x : children.y) : (number < 6u ? children.z : children.w);
+  return LspWideChild(node_first, triangle_first, (pair >> ((number & 1u) * 16u)) & 0xFFFFu);
+}
 
 /* Of a filled cell what is read together; the rest is zero. */
 LspFilledCell lsp_cell_origins_of(uvec4 w) { return LspFilledCell(w.x, w.y, w.z, w.w, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u); }

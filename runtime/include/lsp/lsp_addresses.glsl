@@ -20,7 +20,7 @@ layout(buffer_reference, std430, buffer_reference_align = 4) readonly buffer Lsp
 
 /* The table of a scene's addresses. */
 struct LspScene {
-  uvec2 nodes; /* of an NTree: GRID */
+  uvec2 nodes; /* of an NTree: GRID; with LSP_WIDE: WNOD */
   uvec2 triangles;
   uvec2 normals;
   uvec2 line_spaces;
@@ -80,6 +80,19 @@ LspCellNode lsp_load_cell_node(LspScene scene, uint i) {
 }
 uint lsp_load_cell_reference(LspScene scene, uint i) {
   return i < lsp_header.cell_reference_count ? LspWords(scene.references).at[i] : 0u;
+}
+#elif defined(LSP_WIDE)
+LspWideNode lsp_load_wide_node(LspScene scene, uint i) {
+  if (i >= lsp_header.wide_node_count)
+    return lsp_wide_node_of(uvec4(0u), uvec4(0u), uvec4(0u), uvec4(0u), uvec4(0u), uvec4(0u));
+  LspWords4 words = LspWords4(scene.nodes);
+  return lsp_wide_node_of(words.at[6u * i], words.at[6u * i + 1u], words.at[6u * i + 2u], words.at[6u * i + 3u],
+                          words.at[6u * i + 4u], words.at[6u * i + 5u]);
+}
+LspWideChild lsp_load_wide_child(LspScene scene, uint i, uint number) {
+  if (i >= lsp_header.wide_node_count) return LspWideChild(0u, 0u, 0u);
+  LspWords4 words = LspWords4(scene.nodes);
+  return lsp_wide_child_of(words.at[6u * i].w, words.at[6u * i + 1u].w, words.at[6u * i + 2u], number);
 }
 #else
 #ifdef LSP_NTREE

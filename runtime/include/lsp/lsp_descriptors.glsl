@@ -23,10 +23,12 @@ LSP_SECTION_BUFFER(LSP_BINDING_CELL_REFERENCES) LspCellReferenceBuffer { uint ls
 LSP_SECTION_BUFFER(LSP_BINDING_NODES) LspGridBuffer { uvec2 lsp_grid_words[]; };
 LSP_SECTION_BUFFER(LSP_BINDING_CELLS) LspCellBuffer { LspCell lsp_cells[]; };
 LSP_SECTION_BUFFER(LSP_BINDING_REFERENCES) LspReferenceBuffer { uint lsp_references[]; };
+#elif defined(LSP_WIDE)
+LSP_SECTION_BUFFER(LSP_BINDING_NODES) LspWideNodeBuffer { uvec4 lsp_wide_node_words[]; };
 #else
 LSP_SECTION_BUFFER(LSP_BINDING_NODES) LspNodeBuffer { uvec4 lsp_node_words[]; };
 #endif
-#ifndef LSP_CELLS
+#if !defined(LSP_CELLS) && !defined(LSP_WIDE)
 LSP_SECTION_BUFFER(LSP_BINDING_LINE_SPACES) LspLineSpaceBuffer { uvec4 lsp_line_space_words[]; };
 LSP_SECTION_BUFFER(LSP_BINDING_BIT_WORDS) LspBitWordBuffer { uvec2 lsp_bit_words[]; };
 LSP_SECTION_BUFFER(LSP_BINDING_CANDIDATES) LspCandidateBuffer { uint lsp_candidate_words[]; };
@@ -53,6 +55,16 @@ uint lsp_load_plane_record(LspScene scene, uint i) { return lsp_plane_records[i]
 LspSplit lsp_load_split(LspScene scene, uint i) { return lsp_split_of(lsp_split_words[i]); }
 LspCellNode lsp_load_cell_node(LspScene scene, uint i) { return lsp_cell_node_of(lsp_cell_node_words[i]); }
 uint lsp_load_cell_reference(LspScene scene, uint i) { return lsp_cell_references[i]; }
+#elif defined(LSP_WIDE)
+LspWideNode lsp_load_wide_node(LspScene scene, uint i) {
+  return lsp_wide_node_of(lsp_wide_node_words[6u * i], lsp_wide_node_words[6u * i + 1u], lsp_wide_node_words[6u * i + 2u],
+                          lsp_wide_node_words[6u * i + 3u], lsp_wide_node_words[6u * i + 4u],
+                          lsp_wide_node_words[6u * i + 5u]);
+}
+LspWideChild lsp_load_wide_child(LspScene scene, uint i, uint number) {
+  return lsp_wide_child_of(lsp_wide_node_words[6u * i].w, lsp_wide_node_words[6u * i + 1u].w,
+                           lsp_wide_node_words[6u * i + 2u], number);
+}
 #else
 #ifdef LSP_NTREE
 LspBitWord lsp_load_grid(LspScene scene, uint i) {

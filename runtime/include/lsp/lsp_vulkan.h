@@ -57,6 +57,9 @@ typedef struct lsp_vulkan_limits {
       max_buffer_size; /* VkPhysicalDeviceMaintenance4Properties::maxBufferSize; 0: the device does not say */
 } lsp_vulkan_limits;
 
+/* What the shader has to be made for besides the base structures of files: wide nodes, LSP_FEATURE_WIDE. */
+#define LSP_BASE_WIDE 4u
+
 /* One buffer of the scene: file bytes [file_offset, file_offset + bytes) as they are. */
 typedef struct lsp_vulkan_buffer {
   uint32_t binding; /* LSP_BINDING_* */
@@ -72,7 +75,8 @@ typedef struct lsp_vulkan_plan {
   uint64_t bytes;           /* of all buffers together */
   VkBufferUsageFlags usage; /* of every buffer; an imported one can do without the transfer bit */
   uint32_t addresses; /* nonzero: the sections are read through addresses, see lsp_vulkan_address_table */
-  uint32_t base_structure; /* LSP_BASE_*: the shader has to be made for it */
+  uint32_t base_structure;  /* LSP_BASE_*: the shader has to be made for it */
+  uint32_t exact_structure; /* the same of exact rays alone: of cells LSP_BASE_WIDE, or LSP_BASE_BVH */
 } lsp_vulkan_plan;
 
 /* Usage of every buffer of a plan without addresses. */
@@ -153,7 +157,7 @@ LSP_API void lsp_vulkan_record_upload_barrier(const lsp_vulkan_functions* functi
 LSP_API uint32_t lsp_vulkan_parts(const lsp_scene* scene);
 
 /* SPIR-V (for Vulkan 1.1) of the trace shader for scenes planned like `plan` (of cells: for approximate rays;
- * for exact ones set base_structure of a copy to LSP_BASE_BVH), entry point "main"; with `counting` nonzero
+ * for exact ones set base_structure of a copy to its exact_structure), entry point "main"; with `counting` nonzero
  * the one that adds to the counters. Only base_structure and addresses of the plan matter; with addresses the
  * device's bufferDeviceAddress feature must be on, else no feature is needed. Sets *bytes to the size. The
  * words live as long as the program. */

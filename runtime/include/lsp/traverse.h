@@ -1,5 +1,5 @@
-/* Exact and approximate traversal of an .lsp scene, in the common subset of GLSL 4.6 and C++20: of a BVH, or
- * with LSP_NTREE defined of an NTree.
+/* Exact and approximate traversal of an .lsp scene, in the common subset of GLSL 4.6 and C++20: of a BVH; with
+ * LSP_NTREE defined of an NTree, with LSP_WIDE of wide nodes, with LSP_CELLS of cells.
  *
  * lsp.glsl includes this file in shaders, runtime/src/trace_bvh.cpp and its like within a struct, whose
  * members the functions and the stack then are: one text, so that both give the same bits. That holds where
@@ -101,8 +101,9 @@ struct LspBest {
   float t;
   float u;
   float v;
-  uint triangle; /* record, LSP_NONE: none */
-  uint flags;    /* LSP_HIT_* */
+  uint triangle;  /* record, LSP_NONE: none */
+  uint primitive; /* its, of an exact hit */
+  uint flags;     /* LSP_HIT_* */
   bool complete; /* the traversal ran to its end */
 };
 
@@ -113,6 +114,7 @@ LSP_FN LspBest lsp_no_best(LspSetup s) {
   best.u = 0.0f;
   best.v = 0.0f;
   best.triangle = LSP_NONE;
+  best.primitive = 0u; /* none comes before it */
   best.flags = 0u;
   best.complete = false;
   return best;
@@ -300,7 +302,8 @@ LSP_FN_RARE float lsp_plane_depth(vec3 direction, float shear_z, vec3 a, vec3 b,
   return lsp_min(lsp_max(lsp_max(z.x, z.y), z.z), t);
 }
 
-/* Watertight triangle test (Woop et al. 2013). Keeps a hit nearer than best.t and beyond tmin. */
+/* Watertight triangle test (Woop et al. 2013). Keeps a hit nearer than best.t and beyond tmin; of those at one
+ * distance that of the lowest primitive: the answer does not depend on the order in which triangles are met. */
 LSP_FN LspBest lsp_triangle(LspScene scene, LspSetup s, uint index, LspBest best) {
   LspTriangle tri = lsp_load_triangle(scene, index);
   vec3 a = lsp_rotate(lsp_vec3(tri.v0) - s.origin, s.axis);
@@ -319,7 +322,8 @@ LSP_FN LspBest lsp_triangle(LspScene scene, LspSetup s, uint index, LspBest best
   precise float det = u + v + w;
   if (det == 0.0f || !lsp_is_finite(det)) return best;
   float t = lsp_plane_depth(lsp_rotate(s.direction, s.axis), s.shear.z, a, b, c);
-  if (t > s.tmin && t < best.t) {
+  bool nearer = t < best.t || (t == best.t && tri.primitive < best.primitive);
+  if (t > s.tmin && nearer) {
     if ((LSP_PARTS & LSP_PART_COVERAGE) != 0u && lsp_passes(s, tri)) return best;
     best.t = t;
     precise float weight1 = v / det; /* not by 1 / det: det may be so small that it is infinite */
@@ -327,6 +331,7 @@ LSP_FN LspBest lsp_triangle(LspScene scene, LspSetup s, uint index, LspBest best
     best.u = weight1;
     best.v = weight2;
     best.triangle = index;
+    best.primitive = tri.primitive;
     best.flags = 0u;
   }
   return best;
@@ -377,7 +382,7 @@ LSP_FN vec2 lsp_plane_weights(LspSetup s, LspTriangle tri, float t) {
   return weights;
 }
 
-#ifndef LSP_CELLS
+#if !defined(LSP_CELLS) && !defined(LSP_WIDE)
 /* Where the ray passes the box of a Line Space, and which shaft it takes. The shaft is in range for any ray;
  * a ray that misses the box has t_in > t_out. Entry and exit face are never the same one: on one axis they
  * are its two sides. */
@@ -614,6 +619,8 @@ LSP_STEP void lsp_look_up(LspScene scene, LspSetup s, LspQuery q) {
   lsp_answer(scene, s, q, ls, pass, candidate);
 }
 
+#elif defined(LSP_WIDE)
+#include "lsp/wide.h"
 #else
 #include "lsp/cells.h"
 #endif

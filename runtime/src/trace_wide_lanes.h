@@ -1,0 +1,21 @@
+// Exact rays of a scene with wide nodes, a node's eight boxes in the lanes of a vector: trace_wide_lanes.cpp.
+#pragma once
+
+#include "lsp/lsp.h"
+
+namespace lsp {
+
+// One vector instruction set, and the loop compiled for it. The bits are those of solid::kWideLoops.
+struct WideExact {
+  const char* name;
+  bool (*runs_here)();  // on this CPU
+  void (*trace)(const lsp_scene& scene, bool any_hit, const LspRay* rays, LspHit* hits, uint64_t count);
+};
+
+// All that are compiled in, the best first, and a last one whose name is null.
+extern const WideExact kWideExact[];
+
+// The best that runs here; scenes with triangles that are there in part are not for it. Null: none does.
+const WideExact* wide_exact();
+
+}  // namespace lsp
