@@ -27,6 +27,7 @@ enums:
     0x44495247: grid
     0x4c4c4543: cell
     0x53464552: refs
+    0x444f4e57: wnod
     0x44524743: cgrd
     0x544c4543: celt
     0x544e4543: cent
@@ -200,7 +201,7 @@ types:
         type: u4
         repeat: expr
         repeat-expr: 3
-      - id: reserved_2
+      - id: wide_node_count
         type: u4
   section:
     seq:
@@ -249,6 +250,7 @@ types:
             'section_type::grid': bit_words
             'section_type::cell': cells
             'section_type::refs': words
+            'section_type::wnod': wide_nodes
             'section_type::cgrd': words
             'section_type::celt': filled_cells
             'section_type::cent': words
@@ -529,6 +531,33 @@ types:
         type: u4
       - id: children
         type: u4
+  wide_nodes:
+    seq:
+      - id: elements
+        type: wide_node
+        repeat: eos
+  wide_node:
+    seq:
+      - id: lo
+        type: vec3
+      - id: node_first
+        type: u4
+      - id: step
+        type: vec3
+      - id: triangle_first
+        type: u4
+      - id: children
+        type: u4
+        repeat: expr
+        repeat-expr: 4
+        doc: |
+          Two children in a word, the lower half first: ffff is none; with bit 15 the rest counts from node_first; else
+          a leaf of bits 11 to 14 plus 1 triangles, the first counted from triangle_first in bits 0 to 10.
+      - id: planes
+        type: u4
+        repeat: expr
+        repeat-expr: 12
+        doc: lo x, y, z, hi x, y, z in steps from lo; of each a byte a child, child 0 lowest, in two words.
   words:
     doc: Candidate entries of 1, 2 or 4 bytes, packed; or indices of triangles.
     seq:

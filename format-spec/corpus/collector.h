@@ -15,11 +15,13 @@ class Collector {
  public:
   std::vector<InvalidFile> files;
 
-  void add(format::RuleId rule, const char* mutation, Bytes bytes, std::vector<std::string> arguments = {}) {
+  void add(format::RuleId rule, const char* mutation, Bytes bytes, std::vector<std::string> arguments = {},
+           const char* base = "-ntree") {
     std::string name = format::rule_label(rule) + "-" + format::rule(rule).name;
-    // A rule of both base structures has a file for each.
+    // A rule of several base structures has a file for each.
+    const std::string first = name;
     for (const InvalidFile& file : files)
-      if (file.name == name) name += "-ntree";
+      if (file.name == first) name = first + base;
     files.push_back({rule, name, mutation, std::move(arguments), std::move(bytes)});
   }
 
@@ -79,8 +81,9 @@ class Collector {
   }
 };
 
-// The files that break the rules of the NTree, and of cells.
+// The files that break the rules of the NTree, of cells, and of wide nodes.
 void break_ntrees(Collector& c);
 void break_cells(Collector& c);
+void break_wide_nodes(Collector& c);
 
 }  // namespace lsp::corpus

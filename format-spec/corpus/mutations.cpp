@@ -353,6 +353,7 @@ std::vector<InvalidFile> invalid_files() {
   metadata_and_source(collector);
   break_ntrees(collector);
   break_cells(collector);
+  break_wide_nodes(collector);
   return std::move(collector.files);
 }
 

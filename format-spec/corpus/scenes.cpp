@@ -8,6 +8,7 @@
 #include "cells_scenes.h"
 #include "line_space_tables.h"
 #include "ntree_scenes.h"
+#include "wide_scenes.h"
 
 namespace lsp::corpus {
 namespace {
@@ -272,6 +273,10 @@ std::vector<ValidFile> valid_files() {
   add("cells", "cells beside a BVH", encode(full_cells_scene()));
   add("cells-tables", "cells alone: tables and the triangles of their planes",
       encode(full_cells_scene(false)));
+  add("wide", "cells beside wide nodes, three levels of them", encode(full_wide_scene()));
+  add("wide-packed", "the same, packed", packed(full_wide_scene()));
+  add("wide-empty", "no geometry: no wide node, the feature bit is set all the same",
+      encode(empty_wide_scene()));
   return files;
 }
 

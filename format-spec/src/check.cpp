@@ -58,7 +58,10 @@ Report check_file(std::span<const std::byte> bytes, const CheckOptions& options)
   // Without EXACT a file of cells has no tree.
   const bool none = has_cells(view.header) && (view.header.required_features & LSP_FEATURE_EXACT) == 0;
   const bool tree = !none && (!ntree || ntree_readable(view.header)) && tree_usable(view);
-  if (tree) ntree ? check_ntree(view, report) : check_tree(view, report);
+  if (tree)
+    ntree                     ? check_ntree(view, report)
+    : walks_wide(view.header) ? check_wide(view, report)
+                              : check_tree(view, report);
   if (has_cells(view.header) && cells_readable(view.header) && tree_usable(view)) check_cells(view, report);
   if (view.part(Kind::kLspc).usable) check_line_spaces(view, report);
   if (options.level < Level::kGeometry) return report;

@@ -2,9 +2,9 @@
 //
 // The bytes may be hostile. No count, offset or size of the file is used before it was checked against the
 // bytes that are there; memory used beyond the file is at most `memory_limit` for unpacked sections, some 30
-// bytes a node of a damaged tree, some 20 bytes a triangle of an NTree and, at the level geometry, some 30
-// bytes a triangle and a node of an NTree; four to 32 bytes a cell of a grid of cells. Nothing is written, no
-// thread is started. Time is proportional to the file's size.
+// bytes a node of a damaged tree, 16 a wide node, some 20 bytes a triangle of an NTree and, at the level
+// geometry, some 30 bytes a triangle and a node of an NTree; four to 32 bytes a cell of a grid of cells.
+// Nothing is written, no thread is started. Time is proportional to the file's size.
 #pragma once
 
 #include <cstddef>

@@ -6,11 +6,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <numeric>
 
 #include "layers.h"
 #include "line_space.h"
 #include "octahedral.h"
+#include "wide.h"
 
 namespace lsp::format {
 namespace {
@@ -59,6 +61,8 @@ class GeometryCheck {
       : view_(view),
         report_(report),
         nodes_(view.elements<LspNode>(Kind::kNode)),
+        wide_nodes_(walks_wide(view.header) ? view.elements<LspWideNode>(Kind::kWnod)
+                                            : std::span<const LspWideNode>()),
         triangles_(view.elements<LspTriangle>(Kind::kTria)),
         normals_(view.elements<LspCornerNormals>(Kind::kNrml)),
         spaces_(view.elements<LspLineSpace>(Kind::kLspc)) {
@@ -76,10 +80,15 @@ class GeometryCheck {
     const std::span<const LspMaterial> materials = view_.elements<LspMaterial>(Kind::kMatl);
     for (uint64_t i = 0; i < materials.size(); ++i) check_material(i, materials[i]);
     leaf_of_.assign(triangles_.size(), kNoLeaf);
-    check_child(view_.header.root, view_.header.root_line_space, kNoLeaf);
-    for (uint64_t i = 0; i < nodes_.size(); ++i) {
-      check_child(nodes_[i].child0, nodes_[i].line_space0, i * 2);
-      check_child(nodes_[i].child1, nodes_[i].line_space1, i * 2 + 1);
+    if (walks_wide(view_.header)) {
+      for (uint64_t i = 0; i < wide_nodes_.size(); ++i)
+        for (uint32_t k = 0; k < LSP_WIDE_CHILDREN; ++k) check_wide_child(i, k);
+    } else {
+      check_child(view_.header.root, view_.header.root_line_space, kNoLeaf);
+      for (uint64_t i = 0; i < nodes_.size(); ++i) {
+        check_child(nodes_[i].child0, nodes_[i].line_space0, i * 2);
+        check_child(nodes_[i].child1, nodes_[i].line_space1, i * 2 + 1);
+      }
     }
     check_primitives();
   }
@@ -165,26 +174,46 @@ class GeometryCheck {
                   "reserved is not zero");
   }
 
-  // The box of a child: `slot` is node * 2 + side, kNoLeaf for the root.
+  // The box of a child: `slot` is node * 2 + side, kNoLeaf for the root; of wide nodes node * 8 + child.
   Box slot_box(uint64_t slot) const {
     if (slot == kNoLeaf) return {view_.header.bounds_min, view_.header.bounds_max};
+    if (walks_wide(view_.header)) {
+      const WideBox box = wide_box(wide_nodes_[slot / LSP_WIDE_CHILDREN], slot % LSP_WIDE_CHILDREN);
+      return {rounded(box.lo), rounded(box.hi)};
+    }
     const LspNode& node = nodes_[slot / 2];
     return slot % 2 == 0 ? Box{node.lo0, node.hi0} : Box{node.lo1, node.hi1};
   }
 
-  void check_child(uint32_t child, uint32_t line_space, uint64_t slot) {
-    if (child != LSP_NONE && (child & LSP_LEAF_BIT)) {
-      const uint64_t first = child & LSP_LEAF_FIRST_MASK;
-      const uint64_t count = (child >> LSP_LEAF_COUNT_SHIFT & LSP_LEAF_COUNT_MASK) + 1;
-      if (!in_range(first, count, triangles_.size())) return;
-      const Box box = slot_box(slot);
-      for (uint64_t i = first; i < first + count; ++i) {
-        leaf_of_[i] = slot == kNoLeaf ? kNoLeaf : slot;
-        if (!overlap(box, box_of(triangles_[i]), slack_))
-          find_triangle(RuleId::kTriangleOutsideLeaf, i, nullptr, 0, 48,
-                        "the triangle does not meet the box of its leaf");
-      }
+  // What rounding to floats moves is below the slack.
+  static lsp_float3 rounded(const double (&v)[3]) {
+    constexpr double kMost = std::numeric_limits<float>::max();
+    const auto round = [kMost](double x) { return static_cast<float>(std::clamp(x, -kMost, kMost)); };
+    return {round(v[0]), round(v[1]), round(v[2])};
+  }
+
+  void check_wide_child(uint64_t node, uint32_t k) {
+    const uint32_t child = wide_child(wide_nodes_[node], k);
+    if (child == LSP_WIDE_NO_CHILD || (child & LSP_WIDE_NODE_BIT)) return;
+    check_leaf(uint64_t{wide_nodes_[node].triangle_first} + wide_leaf_first(child), wide_leaf_count(child),
+               node * LSP_WIDE_CHILDREN + k);
+  }
+
+  void check_leaf(uint64_t first, uint64_t count, uint64_t slot) {
+    if (!in_range(first, count, triangles_.size())) return;
+    const Box box = slot_box(slot);
+    for (uint64_t i = first; i < first + count; ++i) {
+      leaf_of_[i] = slot;
+      if (!overlap(box, box_of(triangles_[i]), slack_))
+        find_triangle(RuleId::kTriangleOutsideLeaf, i, nullptr, 0, 48,
+                      "the triangle does not meet the box of its leaf");
     }
+  }
+
+  void check_child(uint32_t child, uint32_t line_space, uint64_t slot) {
+    if (child != LSP_NONE && (child & LSP_LEAF_BIT))
+      check_leaf(child & LSP_LEAF_FIRST_MASK, (child >> LSP_LEAF_COUNT_SHIFT & LSP_LEAF_COUNT_MASK) + 1,
+                 slot);
     const uint64_t index = line_space & LSP_LINE_SPACE_MASK;
     if (line_space == LSP_NONE || index >= spaces_.size()) return;
     check_line_space(index, slot_box(slot));
@@ -256,10 +285,11 @@ class GeometryCheck {
   const FileView& view_;
   Report& report_;
   std::span<const LspNode> nodes_;
+  std::span<const LspWideNode> wide_nodes_;
   std::span<const LspTriangle> triangles_;
   std::span<const LspCornerNormals> normals_;
   std::span<const LspLineSpace> spaces_;
-  std::vector<uint64_t> leaf_of_;  // node * 2 + side
+  std::vector<uint64_t> leaf_of_;  // as slot_box takes it
   float slack_ = 0;
 };
 

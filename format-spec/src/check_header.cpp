@@ -1,4 +1,5 @@
 // Identification and header: what the first 256 bytes may say.
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstddef>
@@ -62,7 +63,13 @@ void check_features(const LspHeader& header, const FileView& view, Report& repor
 }
 
 void check_root(const LspHeader& header, Report& report) {
-  if (header.node_count != 0) {
+  if (walks_wide(header)) {
+    if (header.root != LSP_NONE)
+      LSP_HEADER_FINDING(kRootReference, root,
+                         "is " + hex(header.root) + ", but a file with WIDE has root none");
+    else if (header.triangle_count != 0 && header.wide_node_count == 0)
+      LSP_HEADER_FINDING(kRootReference, root, "is none without wide nodes, but the file has triangles");
+  } else if (header.node_count != 0) {
     if (header.root != 0)
       LSP_HEADER_FINDING(kRootReference, root,
                          "is " + hex(header.root) + ", but a file with nodes has root 0");
@@ -86,6 +93,22 @@ void check_root(const LspHeader& header, Report& report) {
     LSP_HEADER_FINDING(kRootLineSpace, root_line_space,
                        "names Line Space " + std::to_string(header.root_line_space & LSP_LINE_SPACE_MASK) +
                            " of " + std::to_string(header.line_space_count));
+}
+
+// Wide nodes, of cells alone, and nothing beside them that exact rays walk.
+void check_wide_nodes(const LspHeader& header, Report& report) {
+  const uint32_t features = header.required_features;
+  if ((features & LSP_FEATURE_WIDE) == 0) {
+    if (header.wide_node_count != 0)
+      LSP_HEADER_FINDING(kWideNodes, wide_node_count,
+                         "is " + std::to_string(header.wide_node_count) + ", but WIDE is clear");
+  } else if (!has_cells(header) || (features & LSP_FEATURE_EXACT) == 0) {
+    LSP_HEADER_FINDING(kWideNodes, required_features, "WIDE is set without EXACT or without cells");
+  } else if (header.node_count != 0 || header.line_space_count != 0) {
+    LSP_HEADER_FINDING(kWideNodes, node_count,
+                       std::to_string(header.node_count) + " nodes of a BVH and " +
+                           std::to_string(header.line_space_count) + " Line Spaces beside wide nodes");
+  }
 }
 
 void check_cube(const LspHeader& header, Report& report) {
@@ -160,11 +183,14 @@ void check_limits(const LspHeader& header, Report& report) {
   if (header.max_depth > LSP_MAX_STACK)
     LSP_HEADER_FINDING(kDepthBound, max_depth,
                        "is " + std::to_string(header.max_depth) + ", the limit is 96");
-  const uint64_t steps = is_ntree(header) ? lsp_ntree_steps(&header) : 2 * uint64_t{header.node_count};
+  const uint64_t steps = is_ntree(header)     ? lsp_ntree_steps(&header)
+                         : walks_wide(header) ? 9 * uint64_t{header.wide_node_count}
+                                              : 2 * uint64_t{header.node_count};
   if (header.max_steps > steps + kStepsSlack)
-    LSP_HEADER_FINDING(
-        kStepsBound, max_steps,
-        "is " + std::to_string(header.max_steps) + " for " + std::to_string(header.node_count) + " nodes");
+    LSP_HEADER_FINDING(kStepsBound, max_steps,
+                       "is " + std::to_string(header.max_steps) + " for " +
+                           std::to_string(walks_wide(header) ? header.wide_node_count : header.node_count) +
+                           " nodes");
   // What a leaf's loop may run to, before anybody has looked at the leaf.
   const uint32_t most = is_ntree(header) ? header.reference_count : LSP_MAX_LEAF_TRIANGLES;
   if (header.max_leaf_triangles > most)
@@ -175,13 +201,15 @@ void check_limits(const LspHeader& header, Report& report) {
     LSP_HEADER_FINDING(
         kSectionCount, section_count,
         "is " + std::to_string(header.section_count) + ", the limit is " + std::to_string(kMaxSections));
-  if (header.node_count > kMaxNodes || header.triangle_count > LSP_LEAF_FIRST_MASK + 1 ||
-      header.line_space_count > kMaxLineSpaces || header.reference_count >= LSP_LEAF_BIT)
-    LSP_HEADER_FINDING(
-        kAddressable, node_count,
-        std::to_string(header.node_count) + " nodes, " + std::to_string(header.triangle_count) +
-            " triangles, " + std::to_string(header.reference_count) + " references and " +
-            std::to_string(header.line_space_count) + " Line Spaces are more than references can name");
+  if (header.node_count > kMaxNodes || header.wide_node_count > kMaxNodes ||
+      header.triangle_count > LSP_LEAF_FIRST_MASK + 1 || header.line_space_count > kMaxLineSpaces ||
+      header.reference_count >= LSP_LEAF_BIT)
+    LSP_HEADER_FINDING(kAddressable, node_count,
+                       std::to_string(std::max(header.node_count, header.wide_node_count)) + " nodes, " +
+                           std::to_string(header.triangle_count) + " triangles, " +
+                           std::to_string(header.reference_count) + " references and " +
+                           std::to_string(header.line_space_count) +
+                           " Line Spaces are more than references can name");
   if (header.resolution > LSP_MAX_RESOLUTION || (header.resolution == 0 && header.line_space_count != 0))
     LSP_HEADER_FINDING(kBakeParameters, resolution, "is " + std::to_string(header.resolution));
 }
@@ -272,6 +300,7 @@ void check_header(const FileView& view, Report& report) {
   check_limits(header, report);
   check_numbers(header, report);
   check_root(header, report);
+  check_wide_nodes(header, report);
   if (!report.fatal()) check_features(header, view, report);
 }
 

@@ -7,6 +7,7 @@
 #include <type_traits>
 
 #include "line_space.h"
+#include "wide.h"
 
 namespace lsp::format {
 namespace {
@@ -123,8 +124,9 @@ struct Fields<LspNode> {
 template <>
 struct Fields<LspWideNode> {
   using Owner = LspWideNode;
-  static constexpr Field list[] = {LSP_FIELD(lo),             LSP_FIELD(node_first), LSP_FIELD(step),
-                                   LSP_FIELD(triangle_first), LSP_FIELD(children),   LSP_FIELD(planes)};
+  static constexpr Field list[] = {LSP_FIELD(lo),       LSP_FIELD(node_first),
+                                   LSP_FIELD(step),     LSP_FIELD(triangle_first),
+                                   LSP_FIELD(children), LSP_FIELD(planes)};
 };
 
 template <>
@@ -218,7 +220,8 @@ constexpr bool complete() {
 static_assert(complete<LspHeader>() && complete<LspSection>() && complete<LspNode>() && complete<LspCell>() &&
               complete<LspTriangle>() && complete<LspCornerNormals>() && complete<LspMaterial>() &&
               complete<LspLineSpace>() && complete<LspBitWord>() && complete<LspFilledCell>() &&
-              complete<LspPlane>() && complete<LspSplit>() && complete<LspCellNode>() && complete<LspWideNode>());
+              complete<LspPlane>() && complete<LspSplit>() && complete<LspCellNode>() &&
+              complete<LspWideNode>());
 
 constexpr Struct kStructs[] = {
     describe<LspHeader>("LspHeader"),     describe<LspSection>("LspSection"),
@@ -268,14 +271,32 @@ std::string format_text(uint32_t value) {
          " bytes an entry" + (shape.dense ? ", dense" : "") + (shape.symmetric ? ", symmetric" : "");
 }
 
+// The children of a wide node.
+std::string wide_children_text(const std::byte* bytes) {
+  std::string text;
+  for (uint32_t k = 0; k < LSP_WIDE_CHILDREN; ++k) {
+    const uint32_t child = load<uint16_t>(bytes + 2 * k);
+    text += k == 0 ? "" : "; ";
+    if (child == LSP_WIDE_NO_CHILD)
+      text += "none";
+    else if (child & LSP_WIDE_NODE_BIT)
+      text += "node +" + std::to_string(child & ~LSP_WIDE_NODE_BIT);
+    else
+      text += "leaf of " + std::to_string(wide_leaf_count(child)) + " from +" +
+              std::to_string(wide_leaf_first(child));
+  }
+  return text;
+}
+
 std::string uint_text(std::string_view name, uint32_t value, bool ntree) {
-  if (name.starts_with("child") || name == "root") return child_text(value, ntree);
+  if (name == "child" || name == "child0" || name == "child1" || name == "root")
+    return child_text(value, ntree);
   if (name == "line_space" || name == "line_space0" || name == "line_space1" || name == "root_line_space")
     return line_space_text(value);
   if (name == "format") return format_text(value);
   if (name == "type") return type_name(value);
-  if (name.starts_with("magic") || name.ends_with("features") || name == "bits" || name == "n0" ||
-      name == "n1" || name == "n2")
+  if (name.starts_with("magic") || name.ends_with("features") || name == "bits" || name == "children" ||
+      name == "planes" || name == "n0" || name == "n1" || name == "n2")
     return hex(value, 8);
   if (name == "codec")
     return value == LSP_CODEC_NONE ? "none" : value == LSP_CODEC_ZSTD ? "zstd" : std::to_string(value);
@@ -316,6 +337,8 @@ const Struct* element_struct(Kind kind) { return find_struct(info(kind).element)
 bool is_words(Kind kind) { return std::string_view(info(kind).element) == "uint32_t"; }
 
 std::string value_text(const Field& field, const std::byte* bytes, bool ntree) {
+  if (field.count() == LSP_WIDE_CHILDREN / 2 && std::string_view(field.name) == "children")
+    return wide_children_text(bytes + field.offset);
   std::string text;
   const uint32_t size = field.bytes / field.count();
   for (uint32_t i = 0; i < field.count(); ++i) {

@@ -26,6 +26,8 @@ void check_source(const FileView& view, Hash128 source, Report& report);
 void check_tree(const FileView& view, Report& report);
 // The same of an NTree. Needs GRID, CELL, REFS and TRIA to be usable or absent, and ntree_readable.
 void check_ntree(const FileView& view, Report& report);
+// The same of wide nodes. Needs WNOD and TRIA to be usable or absent.
+void check_wide(const FileView& view, Report& report);
 // Needs LSPC; looks at BITS and CAND where they are usable.
 void check_line_spaces(const FileView& view, Report& report);
 // Needs a tree whose references are in range, and whole sections.

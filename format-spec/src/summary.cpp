@@ -11,6 +11,7 @@
 #include "fields.h"
 #include "layers.h"
 #include "line_space.h"
+#include "wide.h"
 
 namespace lsp::format {
 namespace {
@@ -24,7 +25,8 @@ Json feature_names(uint32_t features) {
   } kNames[] = {{LSP_FEATURE_EXACT, "exact"},     {LSP_FEATURE_LINE_SPACES, "line spaces"},
                 {LSP_FEATURE_NORMALS, "normals"}, {LSP_FEATURE_MATERIALS, "materials"},
                 {LSP_FEATURE_NTREE, "ntree"},     {LSP_FEATURE_BINARY, "binary"},
-                {LSP_FEATURE_CELLS, "cells"},     {LSP_FEATURE_COVERAGE, "coverage"}};
+                {LSP_FEATURE_CELLS, "cells"},     {LSP_FEATURE_COVERAGE, "coverage"},
+                {LSP_FEATURE_WIDE, "wide"}};
   Json names = Json::array();
   for (const auto& feature : kNames)
     if (features & feature.bit) names.push_back(feature.name);
@@ -68,10 +70,15 @@ class DepthTable {
                                           : std::span<const LspBitWord>()),
         cells_(view.elements<LspCell>(Kind::kCell)),
         spaces_(view.elements<LspLineSpace>(Kind::kLspc)),
+        wide_(view.elements<LspWideNode>(Kind::kWnod)),
         header_(view.header) {}
 
   std::vector<Row> run() {
     const uint32_t words = is_ntree(header_) ? LSP_GRID_WORDS(header_.ntree_branching) : 0;
+    if (walks_wide(header_)) {
+      visit_wide();
+      return std::move(rows_);
+    }
     depth_.assign(grid_.empty() ? nodes_.size() : grid_.size() / words, kUnseen);
     child(header_.root, header_.root_line_space, 0, 0);
     if (is_ntree(header_)) {
@@ -89,6 +96,33 @@ class DepthTable {
  private:
   static constexpr uint32_t kUnseen = LSP_NONE;
   static constexpr uint32_t kMaxRows = 256;  // a damaged file may claim a chain of any length
+
+  // The children of the wide nodes that some node before them names.
+  void visit_wide() {
+    depth_.assign(wide_.size(), kUnseen);
+    if (wide_.empty()) return;
+    depth_[0] = 0;
+    rows_.resize(1);
+    rows_[0].nodes = 1;
+    for (uint64_t i = 0; i < wide_.size(); ++i) {
+      const uint64_t depth = uint64_t{depth_[i]} + 1;
+      if (depth_[i] == kUnseen || depth >= kMaxRows) continue;
+      for (uint32_t k = 0; k < LSP_WIDE_CHILDREN; ++k) {
+        const uint32_t child = wide_child(wide_[i], k);
+        if (child == LSP_WIDE_NO_CHILD) continue;
+        if (rows_.size() <= depth) rows_.resize(depth + 1);
+        if ((child & LSP_WIDE_NODE_BIT) == 0) {
+          ++rows_[depth].leaves;
+          rows_[depth].triangles += wide_leaf_count(child);
+          continue;
+        }
+        const uint64_t node = uint64_t{wide_[i].node_first} + (child & ~LSP_WIDE_NODE_BIT);
+        if (node <= i || node >= depth_.size() || depth_[node] != kUnseen) continue;
+        ++rows_[depth].nodes;
+        depth_[node] = static_cast<uint32_t>(depth);
+      }
+    }
+  }
 
   // The cells of the nodes that some cell before them names, as many as a word has bits and CELL has left.
   void visit_cells(uint32_t words) {
@@ -130,6 +164,7 @@ class DepthTable {
   std::span<const LspBitWord> grid_;  // of an NTree, as the cells
   std::span<const LspCell> cells_;
   std::span<const LspLineSpace> spaces_;
+  std::span<const LspWideNode> wide_;
   const LspHeader& header_;
   std::vector<uint32_t> depth_;
   std::vector<Row> rows_;
@@ -169,6 +204,25 @@ constexpr int kLossLimits[] = LSP_LOSS_LIMITS;
 Json heeded_loss(uint32_t classes) {
   if (classes > LSP_LOSS_UNKNOWN) return nullptr;
   return classes == 0 ? 0 : kLossLimits[classes - 1];
+}
+
+Json wide_nodes(const FileView& view, const std::vector<Row>& rows) {
+  uint64_t nodes = 0, below = 0, leaves = 0, triangles = 0;
+  for (const LspWideNode& node : view.elements<LspWideNode>(Kind::kWnod)) {
+    ++nodes;
+    for (uint32_t k = 0; k < LSP_WIDE_CHILDREN; ++k) {
+      const uint32_t child = wide_child(node, k);
+      if (child == LSP_WIDE_NO_CHILD) continue;
+      const bool leaf = (child & LSP_WIDE_NODE_BIT) == 0;
+      ++(leaf ? leaves : below);
+      if (leaf) triangles += wide_leaf_count(child);
+    }
+  }
+  return {{"nodes", nodes},
+          {"children_per_node", ratio(below + leaves, nodes)},
+          {"leaves", leaves},
+          {"triangles_per_leaf", ratio(triangles, leaves)},
+          {"depth", rows.empty() ? 0 : rows.size() - 1}};
 }
 
 Json cells(const FileView& view) {
@@ -279,11 +333,13 @@ Json summarize(std::span<const std::byte> file, const std::string& name, uint64_
                     {"nodes", header.node_count},           {"line_spaces", header.line_space_count},
                     {"bit_words", header.bit_word_count},   {"candidate_words", header.candidate_word_count},
                     {"materials", header.material_count},   {"cells", header.cell_count},
-                    {"references", header.reference_count}};
+                    {"references", header.reference_count}, {"wide_nodes", header.wide_node_count}};
   if (is_ntree(header))
     json["ntree"] = {
         {"lo", vec(header.ntree_lo)}, {"size", header.ntree_size}, {"margin", header.ntree_margin}};
   if (header.base_structure == LSP_BASE_CELLS) json["cells"] = cells(view);
+  const std::vector<Row> rows = DepthTable(view).run();
+  if (walks_wide(header)) json["wide"] = wide_nodes(view, rows);
   json["limits"] = {{"max_depth", header.max_depth},
                     {"max_stack", header.max_stack},
                     {"max_steps", header.max_steps},
@@ -297,7 +353,7 @@ Json summarize(std::span<const std::byte> file, const std::string& name, uint64_
   json["line_spaces"] = line_spaces(view);
   json["depths"] = Json::array();
   uint64_t depth = 0;
-  for (const Row& row : DepthTable(view).run())
+  for (const Row& row : rows)
     json["depths"].push_back({{"depth", depth++},
                               {"nodes", row.nodes},
                               {"leaves", row.leaves},
@@ -346,6 +402,11 @@ std::string summary_text(const Json& j, const std::string& section) {
                  p["ntree_branching"].get<unsigned>(), p["ntree_depth"].get<unsigned>(),
                  c["cells"].get<unsigned long long>(), c["references"].get<unsigned long long>(),
                  ratio(c["references"].get<uint64_t>(), c["triangles"].get<uint64_t>()));
+  if (j.contains("wide"))
+    text += line("%llu wide nodes of %.2f children, %llu leaves of %.2f triangles, depth %llu\n",
+                 j["wide"]["nodes"].get<unsigned long long>(), j["wide"]["children_per_node"].get<double>(),
+                 j["wide"]["leaves"].get<unsigned long long>(), j["wide"]["triangles_per_leaf"].get<double>(),
+                 j["wide"]["depth"].get<unsigned long long>());
   if (j.contains("cells")) text += cells_text(j["cells"]);
   text += "\n" + head;
   for (const Json& s : j["sections"]) text += section_line(s);

@@ -19,6 +19,11 @@ bool ntree_readable(const LspHeader& header);
 // Whether the grid of cells is in range: CGRD can be read.
 bool cells_readable(const LspHeader& header);
 
+// Whether exact rays walk wide nodes: WNOD stands in the place of NODE.
+inline bool walks_wide(const LspHeader& header) {
+  return has_cells(header) && (header.required_features & LSP_FEATURE_WIDE) != 0;
+}
+
 // How many elements the header says that a section has; nothing for META, and for GRID where the header's
 // parameters are out of range.
 std::optional<uint64_t> declared_count(const LspHeader& header, Kind kind);

@@ -10,6 +10,7 @@
 #include "ntree_scenes.h"
 #include "scenes.h"
 #include "summary.h"
+#include "wide_scenes.h"
 
 namespace {
 
@@ -46,9 +47,10 @@ TEST(Annotate, EveryByteOfEveryPrefix) {
 }
 
 TEST(Annotate, EveryByteOfDamagedFiles) {
-  const Bytes good[] = {encode(full_scene()), encode(full_ntree_scene()), encode(full_cells_scene())};
+  const Bytes good[] = {encode(full_scene()), encode(full_ntree_scene()), encode(full_cells_scene()),
+                        encode(full_wide_scene())};
   for (uint64_t seed = 0; seed < 10000; ++seed) {
-    Bytes bytes = good[seed % 3];
+    Bytes bytes = good[seed % 4];
     Random random(seed);
     mutate(bytes, random);
     expect_all_accounted(bytes, "seed " + std::to_string(seed));
@@ -80,7 +82,8 @@ TEST(Info, CountsOfTheTreeAddUp) {
       nodes += row["nodes"].get<uint64_t>();
       line_spaces += row["line_spaces"].get<uint64_t>();
     }
-    EXPECT_EQ(nodes, json["counts"]["nodes"]) << file.name;
+    EXPECT_EQ(nodes, json["counts"]["nodes"].get<uint64_t>() + json["counts"]["wide_nodes"].get<uint64_t>())
+        << file.name;
     EXPECT_EQ(line_spaces, json["counts"]["line_spaces"]) << file.name;
     EXPECT_EQ(json["findings"], 0) << file.name;
     EXPECT_FALSE(summary_text(json, "").empty());
@@ -101,10 +104,38 @@ TEST(Info, SaysWhatCellsAre) {
   EXPECT_TRUE(cells["exact_above_loss"]["fast"]["far"].is_null());
 }
 
+TEST(Info, SaysWhatWideNodesAre) {
+  const auto json = summarize(encode(full_wide_scene()), "wide", uint64_t{1} << 26);
+  EXPECT_EQ(json["format"], "2.3");
+  EXPECT_EQ(json["features"].back(), "wide");
+  EXPECT_EQ(json["wide"]["nodes"], 4);
+  EXPECT_EQ(json["wide"]["children_per_node"], 2.5);
+  EXPECT_EQ(json["wide"]["leaves"], 7);
+  EXPECT_EQ(json["wide"]["triangles_per_leaf"], 2.0);
+  EXPECT_EQ(json["wide"]["depth"], full_wide_scene().header.max_depth);
+  uint64_t leaves = 0, triangles = 0;
+  for (const auto& row : json["depths"]) {
+    leaves += row["leaves"].get<uint64_t>();
+    triangles += row["triangles"].get<uint64_t>();
+  }
+  EXPECT_EQ(leaves, 7u);
+  EXPECT_EQ(triangles, 14u);
+  EXPECT_NE(summary_text(json, "").find("4 wide nodes of 2.50 children"), std::string::npos);
+  std::string meaning;
+  annotate(encode(full_wide_scene()), {"WNOD"}, [&](const Range& range) {
+    if (range.path == "/sections/WNOD/0") meaning = range.meaning;
+  });
+  EXPECT_NE(
+      meaning.find("children leaf of 4 from +0; node +0; none; leaf of 1 from +4; none; node +1; none; none"),
+      std::string::npos)
+      << meaning;
+}
+
 TEST(Info, SummarisesDamagedFiles) {
-  const Bytes good[] = {encode(full_scene()), encode(full_ntree_scene()), encode(full_cells_scene())};
+  const Bytes good[] = {encode(full_scene()), encode(full_ntree_scene()), encode(full_cells_scene()),
+                        encode(full_wide_scene())};
   for (uint64_t seed = 0; seed < 10000; ++seed) {
-    Bytes bytes = good[seed % 3];
+    Bytes bytes = good[seed % 4];
     Random random(seed);
     mutate(bytes, random);
     try {

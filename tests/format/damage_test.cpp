@@ -8,6 +8,7 @@
 #include "image.h"
 #include "ntree_scenes.h"
 #include "scenes.h"
+#include "wide_scenes.h"
 
 namespace {
 
@@ -21,10 +22,12 @@ Report check_exact(const Bytes& bytes, Level level = Level::kGeometry) {
 }
 
 // Of every base structure: every test below runs on the full scene of each.
-std::vector<Image> full_scenes() { return {full_scene(), full_ntree_scene(), full_cells_scene()}; }
+std::vector<Image> full_scenes() {
+  return {full_scene(), full_ntree_scene(), full_cells_scene(), full_wide_scene()};
+}
 
 TEST(Damage, EveryPrefixOfAValidFileIsRefused) {
-  for (const char* name : {"full", "packed", "ntree-full", "ntree-packed", "cells"}) {
+  for (const char* name : {"full", "packed", "ntree-full", "ntree-packed", "cells", "wide", "wide-packed"}) {
     for (const ValidFile& file : valid_files()) {
       if (file.name != name) continue;
       for (size_t size = 0; size < file.bytes.size(); ++size) {
@@ -153,7 +156,7 @@ TEST(Damage, MisalignedSections) {
         table_of(bytes)[section].offset -= 1;
         if (!counted) {
           LspHeader& h = header_of(bytes);
-          h.line_space_count = h.node_count = h.cell_count = h.reference_count = 0;
+          h.line_space_count = h.node_count = h.cell_count = h.reference_count = h.wide_node_count = 0;
         }
         repair_hashes(bytes);
         EXPECT_TRUE(check_exact(bytes).has(RuleId::kSectionMisaligned)) << section;
@@ -198,6 +201,43 @@ TEST(Damage, AChainOfAMillionNodes) {
   image.nodes.back().child0 = LSP_LEAF_BIT;
   const Report report = check_exact(encode(image));
   EXPECT_TRUE(report.has(RuleId::kDepthExceeded));
+}
+
+// The same of wide nodes, each the only child of the one before it.
+TEST(Damage, AChainOfAMillionWideNodes) {
+  Image image = full_wide_scene();
+  LspWideNode link = image.wide_nodes[0];
+  for (uint32_t k = 0; k < LSP_WIDE_CHILDREN; ++k) {
+    set_child(link, k, LSP_WIDE_NO_CHILD);
+    set_planes(link, k, {255, 255, 255, 0, 0, 0});
+  }
+  set_child(link, 4, LSP_WIDE_NODE_BIT);
+  set_planes(link, 4, {0, 0, 0, 255, 255, 255});
+  image.wide_nodes.assign(1000000, link);
+  for (size_t i = 0; i < image.wide_nodes.size(); ++i)
+    image.wide_nodes[i].node_first = static_cast<uint32_t>(i + 1);
+  set_child(image.wide_nodes.back(), 4, 13u << LSP_WIDE_LEAF_COUNT_SHIFT);
+  const Report report = check_exact(encode(image));
+  EXPECT_TRUE(report.has(RuleId::kDepthExceeded));
+  EXPECT_TRUE(report.has(RuleId::kStackExceeded));
+  EXPECT_FALSE(report.has(RuleId::kNotDepthFirst));
+}
+
+// Nodes that name themselves, or all the same block: each is visited once all the same.
+TEST(Damage, WideNodesThatNameOneAnother) {
+  for (uint32_t first : {0u, 1u, LSP_NONE, LSP_NONE - 3}) {
+    Image image = full_wide_scene();
+    LspWideNode node = image.wide_nodes[0];
+    for (uint32_t k = 0; k < LSP_WIDE_CHILDREN; ++k) {
+      set_child(node, k, LSP_WIDE_NODE_BIT | k);
+      set_planes(node, k, {0, 0, 0, 255, 255, 255});
+    }
+    node.node_first = first;
+    image.wide_nodes.assign(100000, node);
+    const Report report = check_exact(encode(image));
+    EXPECT_TRUE(report.has(RuleId::kNotDepthFirst)) << first;
+    EXPECT_TRUE(report.has(RuleId::kChildOutOfRange)) << first;
+  }
 }
 
 // The same of an NTree: nodes below nodes, each in the only cell of the one before it.

@@ -15,6 +15,7 @@
 
 #include "fields.h"
 #include "line_space.h"
+#include "wide.h"
 
 namespace {
 
@@ -201,6 +202,28 @@ TEST(Layout, TheWorkedExamples) {
   EXPECT_EQ(100 + (candidates >> entry * 8 & 0xFF), 102u);
   EXPECT_EQ(bits >> 3 & 1, 0u);
   EXPECT_EQ(0x98000007u >> LSP_LEAF_COUNT_SHIFT & LSP_LEAF_COUNT_MASK, 3u);
+}
+
+// That of a wide node.
+TEST(Layout, TheWorkedExampleOfAWideNode) {
+  LspWideNode node{};
+  node.lo = {-2, 0, 0};
+  node.step = {0.5f, 0, 0};
+  node.children[0] = 0x80001800u;
+  node.children[1] = 0xFFFFFFFFu;
+  node.planes[0] = 0x04FF0300u;
+  node.planes[6] = 0x08000804u;
+  EXPECT_EQ(wide_child(node, 0) & LSP_WIDE_NODE_BIT, 0u);
+  EXPECT_EQ(wide_leaf_count(wide_child(node, 0)), 4u);
+  EXPECT_EQ(wide_leaf_first(wide_child(node, 0)), 0u);
+  EXPECT_EQ(wide_child(node, 1), LSP_WIDE_NODE_BIT | 0u);
+  EXPECT_EQ(wide_child(node, 2), LSP_WIDE_NO_CHILD);
+  EXPECT_EQ(wide_box(node, 0).lo[0], -2);
+  EXPECT_EQ(wide_box(node, 0).hi[0], 0);
+  EXPECT_EQ(wide_box(node, 1).lo[0], -0.5);
+  EXPECT_EQ(wide_box(node, 1).hi[0], 2);
+  EXPECT_EQ(wide_plane(node, 0, 2), 255u);
+  EXPECT_EQ(wide_plane(node, 3, 2), 0u);
 }
 
 // "Finding a cell" of an NTree.

@@ -12,6 +12,7 @@
 #include "ntree_scenes.h"
 #include "opened.h"
 #include "scenes.h"
+#include "wide_scenes.h"
 
 namespace {
 
@@ -151,7 +152,7 @@ TEST(Loader, AgreesOnTenThousandRandomMutations) {
 }
 
 TEST(Loader, UnpackOfPackIsTheSameFile) {
-  for (Image image : {full_scene(), full_ntree_scene(), full_cells_scene()})
+  for (Image image : {full_scene(), full_ntree_scene(), full_cells_scene(), full_wide_scene()})
     for (uint32_t alignment : {256u, 4096u, 65536u}) {
       image.alignment = alignment;
       const Bytes raw = encode(image);

@@ -15,6 +15,7 @@
 #include "file.h"
 #include "hash.h"
 #include "image.h"
+#include "wide_scenes.h"
 
 namespace {
 
@@ -136,6 +137,55 @@ Image large_ntree() {
   return image;
 }
 
+// Wide nodes with all their children over one triangle a leaf, side by side, seven levels of them: no bake
+// has as many nodes a triangle.
+class LargeWideScene {
+ public:
+  static constexpr uint32_t kLeaves = 1u << 21;
+
+  Image build() {
+    image_ = empty_wide_scene();
+    LspHeader& h = image_.header;
+    h.primitive_count = kLeaves;
+    h.bounds_max = {kLeaves, 1, 1};
+    h.max_depth = h.max_stack = 7;
+    h.max_leaf_triangles = 1;
+    for (uint32_t i = 0; i < kLeaves; ++i) {
+      const float x = static_cast<float>(i);
+      image_.triangles.push_back({{x, 0, 0}, i, {x + 1, 1, 0}, 0, {x, 0, 1}, 0});
+    }
+    image_.wide_nodes.resize(1);
+    node(0, 0, kLeaves);
+    h.max_steps = static_cast<uint32_t>(image_.wide_nodes.size()) + kLeaves;
+    return std::move(image_);
+  }
+
+ private:
+  void node(uint32_t index, uint32_t first, uint32_t count) {
+    LspWideNode node{};
+    node.lo = {static_cast<float>(first), 0, 0};
+    node.step = {static_cast<float>(count) / 255, 1.0f / 255, 1.0f / 255};
+    node.triangle_first = next_;
+    node.node_first = static_cast<uint32_t>(image_.wide_nodes.size());
+    const bool leaves = count == LSP_WIDE_CHILDREN;
+    for (uint32_t k = 0; k < LSP_WIDE_CHILDREN; ++k) {
+      set_child(node, k, leaves ? k : LSP_WIDE_NODE_BIT | k);
+      set_planes(node, k, {k * 255 / 8, 0, 0, (k * 255 + 262) / 8, 255, 255});
+    }
+    image_.wide_nodes[index] = node;
+    if (leaves) {
+      next_ += LSP_WIDE_CHILDREN;
+      return;
+    }
+    image_.wide_nodes.resize(image_.wide_nodes.size() + LSP_WIDE_CHILDREN);
+    for (uint32_t k = 0; k < LSP_WIDE_CHILDREN; ++k)
+      this->node(node.node_first + k, first + k * count / 8, count / 8);
+  }
+
+  Image image_;
+  uint32_t next_ = 0;
+};
+
 double seconds(const std::function<void()>& work) {
   const auto start = std::chrono::steady_clock::now();
   work();
@@ -177,6 +227,7 @@ TEST(Speed, StructureCostsNoMoreThanFourTimesReadingAndHashing) {
 #endif
   expect_fast(LargeScene().build(), "BVH with Line Spaces");
   expect_fast(large_ntree(), "NTree without Line Spaces");
+  expect_fast(LargeWideScene().build(), "wide nodes");
 }
 
 // The jumps of a large grid with one filled cell are as long as they can be: a check that looks at every cell
