@@ -69,15 +69,6 @@ void set_bvh(const Bvh& bvh, LspHeader& h) {
   h.max_leaf_triangles = bvh.max_leaf_triangles;
 }
 
-// Or, in place of it, of the wide nodes.
-void set_wide(const WideTree& wide, LspHeader& h) {
-  h.root = LSP_NONE;
-  h.max_depth = wide.max_depth;
-  h.max_stack = std::max(1u, wide.max_depth);
-  h.max_steps = wide.max_steps;
-  h.max_leaf_triangles = wide.max_leaf_triangles;
-}
-
 // What the header states of the scene and of how it is to be traced.
 void set_scene(const Mesh& mesh, const BakeOptions& options, const Box& bounds, LspHeader& h) {
   h.bounds_min = f3(bounds.lo);

@@ -79,7 +79,7 @@ void build_cells_base(BakeJob& job) {
 void fill_cells(BakeJob& job) {
   const CellTableOptions& options = job.options.cell_tables;
   Baked& baked = job.baked;
-  baked.cell_tables = fill_cell_tables(baked.cell_grid, job.bvh, baked.header, baked.triangles,
+  baked.cell_tables = fill_cell_tables(baked.cell_grid, baked.wide, baked.header, baked.triangles,
                                        baked.materials, options, job.stage("cells"));
   set_cells(baked.cell_grid, baked.cell_tables, options, baked.header);
   const size_t cells = baked.cell_grid.words.size();

@@ -286,4 +286,15 @@ class Collapse {
 
 WideTree build_wide_tree(const Mesh& mesh, Bvh& bvh) { return Collapse(mesh, bvh).run(); }
 
+void set_wide(const WideTree& tree, LspHeader& header) {
+  header.root = LSP_NONE;
+  header.root_line_space = LSP_NONE;
+  header.node_count = 0;
+  header.wide_node_count = static_cast<uint32_t>(tree.nodes.size());
+  header.max_depth = tree.max_depth;
+  header.max_stack = std::max(1u, tree.max_depth);
+  header.max_steps = tree.max_steps;
+  header.max_leaf_triangles = tree.max_leaf_triangles;
+}
+
 }  // namespace lsp

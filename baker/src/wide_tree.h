@@ -27,4 +27,7 @@ struct WideTree {
 // subtree's records are together no more.
 WideTree build_wide_tree(const Mesh& mesh, Bvh& bvh);
 
+// Writes what the header states of the tree for exact rays.
+void set_wide(const WideTree& tree, LspHeader& header);
+
 }  // namespace lsp

@@ -118,11 +118,17 @@ HWY_INLINE V4 plane_depth(const P4& direction, V4 shear_z, const P4& a, const P4
   return min_of(max_of(max_of(za, zb), zc), max_of(min_of(min_of(za, zb), zc), t));
 }
 
-// What is waiting: a node or a leaf (as LspWalk.ref), and where it is entered.
+// What is waiting, of closest rays a child of a node: where it is entered, and 8 * node + child. Of any-hit rays all
+// children of a node that are left, a bit each. What they refer to is looked up when it is their turn: most never have
+// one.
 struct Waiting {
-  float t;
-  uint32_t ref;
+  union {
+    float t;
+    uint32_t children;
+  };
+  uint32_t node;
 };
+constexpr uint32_t kNoNode = LSP_NONE;
 
 class Tracer {
  public:
@@ -281,44 +287,28 @@ class Tracer {
   template <bool kAny>
   HWY_INLINE bool walk(const Text::LspSetup& s, Text::LspBest& best) {
     const Slabs slabs(s);
-    uint32_t top = 1, steps = 0;
-    stack_[0] = {-HUGE_VALF, LSP_NONE};
-    uint32_t ref = 0;
+    uint32_t top = 1, steps = 0, ref = 0;
+    stack_[0] = {{-HUGE_VALF}, kNoNode};
     for (;;) {
       while ((ref & LSP_LEAF_BIT) == 0) {
         if (++steps > most_ || top + kChildren > kStack) return false;
         HWY_ALIGN float t[kChildren];
-        const LspWideNode* node = nodes_ + ref;
-        uint32_t hits = ref < node_count_ ? hit_children(*node, slabs, s.tmin, best.t, t) : 0;
+        const LspWideNode& node = nodes_[ref];
+        uint32_t hits = ref < node_count_ ? hit_children(node, slabs, s.tmin, best.t, t) : 0;
         if (hits == 0) {
           ref = pop<kAny>(best.t, top);
           continue;
         }
-        uint32_t child = static_cast<uint32_t>(std::countr_zero(hits));
+        const auto first = static_cast<uint32_t>(std::countr_zero(hits));
         hits &= hits - 1;
-        Waiting next = {t[child], reference_of(*node, child)};
         if constexpr (kAny) {
-          // In the order of the file: the last is pushed first.
-          while (hits != 0) {
-            child = 31 - static_cast<uint32_t>(std::countl_zero(hits));
-            hits ^= 1u << child;
-            stack_[top++] = {t[child], reference_of(*node, child)};
-          }
-        } else if (hits != 0) {
-          const uint32_t bottom = top;
-          do {
-            child = static_cast<uint32_t>(std::countr_zero(hits));
-            hits &= hits - 1;
-            Waiting other = {t[child], reference_of(*node, child)};
-            const Waiting nearer = other.t < next.t ? other : next;
-            other = other.t < next.t ? next : other;
-            next = nearer;
-            uint32_t at = top++;
-            for (; at > bottom && stack_[at - 1].t < other.t; --at) stack_[at] = stack_[at - 1];
-            stack_[at] = other;
-          } while (hits != 0);
+          stack_[top].children = hits;
+          stack_[top].node = ref;
+          top += hits != 0 ? 1 : 0;
+          ref = reference_of(node, first);
+        } else {
+          ref = hits == 0 ? reference_of(node, first) : push_farther(node, ref, t, first, hits, top);
         }
-        ref = next.ref;
       }
       if (ref == LSP_NONE) return true;
       if (++steps > most_) return false;
@@ -328,12 +318,41 @@ class Tracer {
     }
   }
 
+  // Of children `first` and those of `hits`, entered at t: the nearest is returned, the others wait, the farthest lowest.
+  HWY_INLINE uint32_t push_farther(const LspWideNode& node, uint32_t ref, const float* t, uint32_t first,
+                                   uint32_t hits, uint32_t& top) {
+    const uint32_t bottom = top;
+    uint32_t nearest = first;
+    do {
+      auto child = static_cast<uint32_t>(std::countr_zero(hits));
+      hits &= hits - 1;
+      const bool is_nearer = t[child] < t[nearest];
+      const uint32_t other = is_nearer ? nearest : child;
+      nearest = is_nearer ? child : nearest;
+      uint32_t at = top++;
+      for (; at > bottom && stack_[at - 1].t < t[other]; --at) stack_[at] = stack_[at - 1];
+      stack_[at].t = t[other];
+      stack_[at].node = ref << 3 | other;
+    } while (hits != 0);
+    return reference_of(node, nearest);
+  }
+
+  // What waits on top of the stack; LSP_NONE: nothing.
   template <bool kAny>
-  HWY_INLINE uint32_t pop(float best_t, uint32_t& top) const {
-    --top;
-    if constexpr (!kAny)
+  HWY_INLINE uint32_t pop(float best_t, uint32_t& top) {
+    Waiting& group = stack_[top - 1];
+    if constexpr (kAny) {
+      if (group.node == kNoNode) return LSP_NONE;
+      const auto child = static_cast<uint32_t>(std::countr_zero(group.children));
+      group.children &= group.children - 1;
+      top -= group.children == 0 ? 1 : 0;
+      return reference_of(nodes_[group.node], child);
+    } else {
+      --top;
       while (stack_[top].t > best_t) --top;
-    return stack_[top].ref;
+      const uint32_t node = stack_[top].node;
+      return node == kNoNode ? LSP_NONE : reference_of(nodes_[node >> 3], node & 7);
+    }
   }
 
   const lsp_scene& scene_;

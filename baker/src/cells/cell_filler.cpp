@@ -187,30 +187,24 @@ class Filler {
     BvhOptions options;
     options.spatial_splits = false;
     options.heuristic_depth = LSP_MAX_CELL_DEPTH - uint32_t(std::bit_width(LSP_CELL_MAX_REFERENCES));
-    tree_ = build_bvh(mesh, options);
-    out_.tree = compact(tree_, lo_ - scene_.grid.margin, size_ + 2 * scene_.grid.margin);
+    Bvh bvh = build_bvh(mesh, options);
+    out_.tree = compact(bvh, lo_ - scene_.grid.margin, size_ + 2 * scene_.grid.margin);
+    tree_ = build_wide_tree(mesh, bvh);
     for (uint32_t& r : out_.tree.references) r = records_[r];
     Box bounds;
-    for (uint32_t r : tree_.records) {
+    for (uint32_t r : bvh.records) {
       local_.push_back(scene_.triangles[records_[r]]);
       local_.back().primitive = r;
       for (const lsp_float3& v : {local_.back().v0, local_.back().v1, local_.back().v2}) bounds.grow(vec(v));
     }
-    header_.base_structure = LSP_BASE_BVH;
-    header_.required_features = LSP_FEATURE_EXACT;
-    header_.root = tree_.root;
-    header_.root_line_space = LSP_NONE;
+    header_.required_features = LSP_FEATURE_EXACT | LSP_FEATURE_WIDE;
+    set_wide(tree_, header_);
     header_.bounds_min = f3(bounds.lo);
     header_.bounds_max = f3(bounds.hi);
-    header_.node_count = uint32_t(tree_.nodes.size());
     header_.triangle_count = uint32_t(local_.size());
-    header_.max_depth = tree_.max_depth;
-    header_.max_stack = std::max(1u, tree_.max_depth);
-    header_.max_steps = uint32_t(tree_.nodes.size()) + tree_.leaf_count + 1;
-    header_.max_leaf_triangles = tree_.max_leaf_triangles;
     own_ = {};
     own_.header = &header_;
-    own_.nodes = tree_.nodes.data();
+    own_.wide_nodes = tree_.nodes.data();
     own_.triangles = local_.data();
   }
 

@@ -56,24 +56,18 @@ uint32_t loss_class(float loss) {
   return c;
 }
 
-CellTables fill_cell_tables(const CellGrid& grid, const Bvh& bvh, const LspHeader& header,
+CellTables fill_cell_tables(const CellGrid& grid, const WideTree& tree, const LspHeader& header,
                             std::span<const LspTriangle> triangles, std::span<const LspMaterial> materials,
                             const CellTableOptions& options, const std::function<void(double)>& progress) {
   std::vector<LspTriangle> numbered(triangles.begin(), triangles.end());
   for (size_t i = 0; i < numbered.size(); ++i) numbered[i].primitive = uint32_t(i);
   LspHeader whole_header = header;
-  whole_header.base_structure = LSP_BASE_BVH;
-  whole_header.required_features = LSP_FEATURE_EXACT;
-  whole_header.node_count = uint32_t(bvh.nodes.size());
-  whole_header.wide_node_count = 0;
-  whole_header.root = bvh.root;
-  whole_header.max_depth = bvh.max_depth;
-  whole_header.max_stack = std::max(1u, bvh.max_depth);
-  whole_header.max_steps = uint32_t(bvh.nodes.size()) + bvh.leaf_count + 1;
+  whole_header.required_features = LSP_FEATURE_EXACT | LSP_FEATURE_WIDE;
+  set_wide(tree, whole_header);
   whole_header.triangle_count = uint32_t(triangles.size());
   lsp_scene whole{};
   whole.header = &whole_header;
-  whole.nodes = bvh.nodes.data();
+  whole.wide_nodes = tree.nodes.data();
   whole.triangles = numbered.data();
   const float diagonal = glm::length(vec(header.bounds_max) - vec(header.bounds_min));
   std::vector<glm::vec3> colors;

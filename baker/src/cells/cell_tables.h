@@ -8,9 +8,9 @@
 #include <span>
 #include <vector>
 
-#include "bvh.h"
 #include "cell_grid.h"
 #include "lsp/layout.h"
+#include "wide_tree.h"
 
 namespace lsp {
 
@@ -37,8 +37,8 @@ struct CellTables {
 };
 
 // Fills the tables of all cells of the grid on all threads of the current oneTBB arena; the result does not
-// depend on their number.
-CellTables fill_cell_tables(const CellGrid& grid, const Bvh& bvh, const LspHeader& header,
+// depend on their number. `tree` is of the triangles.
+CellTables fill_cell_tables(const CellGrid& grid, const WideTree& tree, const LspHeader& header,
                             std::span<const LspTriangle> triangles, std::span<const LspMaterial> materials,
                             const CellTableOptions& options,
                             const std::function<void(double)>& progress = {});
