@@ -26,3 +26,4 @@ translate() { # NAME SHADER DEFINES...
 translate bvh "$source/runtime/vulkan/trace.comp"
 translate ntree "$source/runtime/vulkan/trace.comp" -DLSP_NTREE
 translate cells "$source/runtime/vulkan/trace.comp" -DLSP_CELLS
+translate wide "$source/runtime/vulkan/trace.comp" -DLSP_WIDE

@@ -473,7 +473,7 @@ class Filler {
   AnswerFit fit_;
   FilledCell out_;
 
-  Bvh tree_;
+  WideTree tree_;
   std::vector<LspTriangle> local_;
   LspHeader header_{};
   lsp_scene own_{};
