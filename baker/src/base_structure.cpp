@@ -91,9 +91,9 @@ void finish_cells(BakeJob& job) { choose_dial(job.baked, job.options.cells_wrong
 
 constexpr BaseStructure kBvh = {0, true, false, bvh_nodes_at, build_bvh_base, fill_bvh, nullptr};
 // It refers to triangles, so that none is repeated; the BVH orders them and fills the Line Spaces.
-constexpr BaseStructure kNTree = {LSP_FEATURE_NTREE, false, false, ntree_nodes_at,
+constexpr BaseStructure kNTree = {LSP_FEATURE_NTREE, false,      false,  ntree_nodes_at,
                                   build_ntree_base,  fill_ntree, nullptr};
-constexpr BaseStructure kCells = {LSP_FEATURE_CELLS, true, true, bvh_nodes_at,
+constexpr BaseStructure kCells = {LSP_FEATURE_CELLS, true,       true,        bvh_nodes_at,
                                   build_cells_base,  fill_cells, finish_cells};
 
 }  // namespace

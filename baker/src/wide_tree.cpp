@@ -12,8 +12,8 @@ namespace {
 
 constexpr size_t kChildren = LSP_WIDE_CHILDREN;
 
-// What is paid for a node, and for a leaf and each of its triangles; only the ratios matter. With 0.1 or 0.6 for the
-// latter a ray visits as many nodes within 3 %.
+// What is paid for a node, and for a leaf and each of its triangles; only the ratios matter. With 0.1 or 0.6
+// for the latter a ray visits as many nodes within 3 %.
 constexpr double kNodeCost = 1.0, kLeafCost = 0.3, kTriangleCost = 0.3;
 constexpr uint32_t kMaxLeaf = 4;  // triangles that subtrees are put together to
 
@@ -152,8 +152,8 @@ class Collapse {
     return box;
   }
 
-  // Chance that a ray through a box passes all triangles of a subtree that becomes a leaf: a line that meets a box of
-  // surface S meets a triangle in it of area A in 2 A / S of the cases.
+  // Chance that a ray through a box passes all triangles of a subtree that becomes a leaf: a line that meets
+  // a box of surface S meets a triangle in it of area A in 2 A / S of the cases.
   double misses(uint32_t ref, double half_surface) const {
     if (!is_leaf_reference(ref))
       return misses(bvh_.nodes[ref].child0, half_surface) * misses(bvh_.nodes[ref].child1, half_surface);
@@ -183,8 +183,9 @@ class Collapse {
     return fate;
   }
   void sort_by_worth(std::vector<Branch>& branches) const {
-    std::stable_sort(branches.begin(), branches.end(),
-                     [&](const Branch& a, const Branch& b) { return fate_of(a).worth() > fate_of(b).worth(); });
+    std::stable_sort(branches.begin(), branches.end(), [&](const Branch& a, const Branch& b) {
+      return fate_of(a).worth() > fate_of(b).worth();
+    });
   }
 
   void collect(uint32_t ref, std::vector<uint32_t*>& leaves) {
@@ -268,8 +269,10 @@ class Collapse {
   static std::pair<uint32_t, uint32_t> bytes(const LspWideNode& n, const Box& box, int axis) {
     const double corner = (&n.lo.x)[axis], step = (&n.step.x)[axis];
     if (step == 0) return {0, 0};
-    const double lo = std::floor((box.lo[axis] - corner) / step), hi = std::ceil((box.hi[axis] - corner) / step);
-    return {static_cast<uint32_t>(std::clamp(lo, 0.0, 255.0)), static_cast<uint32_t>(std::clamp(hi, 0.0, 255.0))};
+    const double lo = std::floor((box.lo[axis] - corner) / step),
+                 hi = std::ceil((box.hi[axis] - corner) / step);
+    return {static_cast<uint32_t>(std::clamp(lo, 0.0, 255.0)),
+            static_cast<uint32_t>(std::clamp(hi, 0.0, 255.0))};
   }
 
   static constexpr size_t kMaxNodes = LSP_LEAF_FIRST_MASK;

@@ -116,8 +116,8 @@ lsp_status check_limits(const LspHeader& header, lsp_error* error) {
   if (const lsp_status status = check_cells(header, error); status != LSP_OK) return status;
   // Every node and leaf is visited once at most, so a loop bounded by this ends soon even where nodes form a
   // ring.
-  const uint64_t steps = is_ntree(header) ? lsp_ntree_steps(&header)
-                                          : 2 * uint64_t{header.node_count} + lsp_wide_steps(&header);
+  const uint64_t steps =
+      is_ntree(header) ? lsp_ntree_steps(&header) : 2 * uint64_t{header.node_count} + lsp_wide_steps(&header);
   if (header.max_steps > steps + kStepsSlack) {
     return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, max_steps),
                 "states %u steps of traversal, more than its %u nodes allow", header.max_steps,

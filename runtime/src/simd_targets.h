@@ -1,8 +1,8 @@
 // What Highway compiles for, and whether this CPU runs it: of the library's sources with vectors.
 //
-// Of Highway headers alone are used: what its library holds is the choice of a target, made with the functions below.
-// The targets are these, and the one without vectors that Highway wants to have. Under sanitizers, with which each
-// takes minutes to compile, one stands for all: they are the same text.
+// Of Highway headers alone are used: what its library holds is the choice of a target, made with the
+// functions below. The targets are these, and the one without vectors that Highway wants to have. Under
+// sanitizers, with which each takes minutes to compile, one stands for all: they are the same text.
 #pragma once
 
 #define HWY_IS_DEBUG_BUILD 0

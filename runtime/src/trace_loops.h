@@ -23,10 +23,10 @@ struct WideLoops {
 namespace solid {
 extern const TraceLoops kBvhLoops, kNTreeLoops;
 extern const WideLoops kWideLoops;
-}
+}  // namespace solid
 namespace partial {
 extern const TraceLoops kBvhLoops, kNTreeLoops;
 extern const WideLoops kWideLoops;
-}
+}  // namespace partial
 
 }  // namespace lsp

@@ -125,7 +125,8 @@ struct LspWideChild {
 };
 LSP_FN LspWideChild lsp_load_wide_child(LspScene scene, uint i, uint number) {
   const LspWideNode& node = lsp_load_wide_node(scene, i);
-  return {node.node_first, node.triangle_first, node.children[number >> 1u] >> ((number & 1u) * 16u) & 0xFFFFu};
+  return {node.node_first, node.triangle_first,
+          node.children[number >> 1u] >> ((number & 1u) * 16u) & 0xFFFFu};
 }
 
 // Asks for an element that is read later. It need not be there.

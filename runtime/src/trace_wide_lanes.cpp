@@ -1,14 +1,15 @@
-// Exact rays through wide nodes (lsp/wide.h), a node's eight boxes side by side in the lanes of a vector, and four
-// triangles of a leaf (Google Highway), compiled for each instruction set and chosen when a trace is asked for.
+// Exact rays through wide nodes (lsp/wide.h), a node's eight boxes side by side in the lanes of a vector, and
+// four triangles of a leaf (Google Highway), compiled for each instruction set and chosen when a trace is
+// asked for.
 //
-// The triangle test is that of lsp/traverse.h, operation by operation: a lane has the bits of a single triangle. The
-// boxes are not: a plane lo + q * step is met at q * (step / d) + (lo / d - o / d), fused where the machine can. What a
-// ray hits does not depend on it, nor on the order in which children are visited (see lsp_triangle; any-hit rays keep
-// to the order of the file), as long as no box is missed whose triangle would be hit. Rounding, with the words of
-// lsp/traverse.h: along the axis (o / d) is off by u max|o|, lo / d by u (max|o| + R), their sum and step / d by u R
-// and 2 u R, q times that and the sum by 3 u R: 8 u R and 2 u max|o| beside the 5 u R of the triangle, where a box is
-// grown by 16 u R + 4 u max|o|. Where a product might overflow, in scenes or from origins beyond 2^40, rays are traced
-// by the text of single ones.
+// The triangle test is that of lsp/traverse.h, operation by operation: a lane has the bits of a single
+// triangle. The boxes are not: a plane lo + q * step is met at q * (step / d) + (lo / d - o / d), fused where
+// the machine can. What a ray hits does not depend on it, nor on the order in which children are visited (see
+// lsp_triangle; any-hit rays keep to the order of the file), as long as no box is missed whose triangle would
+// be hit. Rounding, with the words of lsp/traverse.h: along the axis (o / d) is off by u max|o|, lo / d by u
+// (max|o| + R), their sum and step / d by u R and 2 u R, q times that and the sum by 3 u R: 8 u R and 2 u
+// max|o| beside the 5 u R of the triangle, where a box is grown by 16 u R + 4 u max|o|. Where a product might
+// overflow, in scenes or from origins beyond 2^40, rays are traced by the text of single ones.
 #include "trace_wide_lanes.h"
 
 #include "simd_targets.h"
@@ -86,7 +87,9 @@ HWY_INLINE V4 max_of(V4 a, V4 b) { return hn::IfThenElse(hn::Lt(a, b), b, a); }
 struct P4 {
   V4 x, y, z;
 };
-HWY_INLINE P4 minus(const P4& a, const P4& b) { return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)}; }
+HWY_INLINE P4 minus(const P4& a, const P4& b) {
+  return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
+}
 HWY_INLINE P4 times(const P4& a, V4 b) { return {hn::Mul(a.x, b), hn::Mul(a.y, b), hn::Mul(a.z, b)}; }
 HWY_INLINE P4 select(M4 m, const P4& a, const P4& b) {
   return {hn::IfThenElse(m, a.x, b.x), hn::IfThenElse(m, a.y, b.y), hn::IfThenElse(m, a.z, b.z)};
@@ -118,9 +121,9 @@ HWY_INLINE V4 plane_depth(const P4& direction, V4 shear_z, const P4& a, const P4
   return min_of(max_of(max_of(za, zb), zc), max_of(min_of(min_of(za, zb), zc), t));
 }
 
-// What is waiting, of closest rays a child of a node: where it is entered, and 8 * node + child. Of any-hit rays all
-// children of a node that are left, a bit each. What they refer to is looked up when it is their turn: most never have
-// one.
+// What is waiting, of closest rays a child of a node: where it is entered, and 8 * node + child. Of any-hit
+// rays all children of a node that are left, a bit each. What they refer to is looked up when it is their
+// turn: most never have one.
 struct Waiting {
   union {
     float t;
@@ -159,7 +162,8 @@ class Tracer {
     return text.lsp_trace_ready(scene_, s, {kAny ? LSP_TRACE_ANY_HIT : 0, 0, false, 0}, ray).hit;
   }
 
-  // A ray as boxes take it: by axis the planes it meets first and last (byte of LspWideNode.planes), and from where.
+  // A ray as boxes take it: by axis the planes it meets first and last (byte of LspWideNode.planes), and from
+  // where.
   struct Slabs {
     V8 inverse[3], first_base[3], last_base[3];
     uint32_t first[3], last[3];
@@ -207,7 +211,8 @@ class Tracer {
 
   static HWY_INLINE uint32_t reference_of(const LspWideNode& node, uint32_t child) {
     const uint32_t bits = reinterpret_cast<const uint16_t*>(node.children)[child];
-    const uint32_t leaf = LSP_LEAF_BIT | (bits >> LSP_WIDE_LEAF_COUNT_SHIFT & LSP_LEAF_COUNT_MASK) << LSP_LEAF_COUNT_SHIFT |
+    const uint32_t leaf = LSP_LEAF_BIT |
+                          (bits >> LSP_WIDE_LEAF_COUNT_SHIFT & LSP_LEAF_COUNT_MASK) << LSP_LEAF_COUNT_SHIFT |
                           ((node.triangle_first + (bits & LSP_WIDE_LEAF_FIRST_MASK)) & LSP_LEAF_FIRST_MASK);
     return (bits & LSP_WIDE_NODE_BIT) != 0 ? node.node_first + (bits & ~LSP_WIDE_NODE_BIT) : leaf;
   }
@@ -221,16 +226,20 @@ class Tracer {
     hit_four(first, count, s, best);
   }
 
-  HWY_INLINE void hit_four(uint32_t first, uint32_t count, const Text::LspSetup& s, Text::LspBest& best) const {
+  HWY_INLINE void hit_four(uint32_t first, uint32_t count, const Text::LspSetup& s,
+                           Text::LspBest& best) const {
     const auto x_axis = static_cast<size_t>(s.axis == 2 ? 0 : s.axis + 1);
     const auto y_axis = static_cast<size_t>(s.axis == 0 ? 2 : s.axis - 1);
     const auto z_axis = static_cast<size_t>(s.axis);
     const LspTriangle* records[kLeafLanes];
-    for (uint32_t i = 0; i < kLeafLanes; ++i) records[i] = scene_.triangles + first + (i < count ? i : count - 1);
+    for (uint32_t i = 0; i < kLeafLanes; ++i)
+      records[i] = scene_.triangles + first + (i < count ? i : count - 1);
     // By corner its coordinates seen from the origin, by axis.
     HWY_ALIGN float corners[3][3][kLeafLanes];
     for (size_t c = 0; c < 3; ++c) {
-      const auto row = [&](size_t i) HWY_ATTR { return hn::LoadU(d4, reinterpret_cast<const float*>(records[i]) + 4 * c); };
+      const auto row = [&](size_t i) HWY_ATTR {
+        return hn::LoadU(d4, reinterpret_cast<const float*>(records[i]) + 4 * c);
+      };
       const V4 a = row(0), b = row(1), e = row(2), f = row(3);
       const hn::Repartition<uint64_t, D4> d64;
       const auto pair = [&](V4 v) HWY_ATTR { return hn::BitCast(d64, v); };
@@ -244,10 +253,12 @@ class Tracer {
       hn::Store(hn::Sub(z, hn::Set(d4, s.origin.z)), d4, corners[c][2]);
     }
     const auto corner = [&](size_t c) HWY_ATTR {
-      return P4{hn::Load(d4, corners[c][x_axis]), hn::Load(d4, corners[c][y_axis]), hn::Load(d4, corners[c][z_axis])};
+      return P4{hn::Load(d4, corners[c][x_axis]), hn::Load(d4, corners[c][y_axis]),
+                hn::Load(d4, corners[c][z_axis])};
     };
     const P4 a = corner(0), b = corner(1), c = corner(2);
-    const V4 shear_x = hn::Set(d4, s.shear.x), shear_y = hn::Set(d4, s.shear.y), shear_z = hn::Set(d4, s.shear.z);
+    const V4 shear_x = hn::Set(d4, s.shear.x), shear_y = hn::Set(d4, s.shear.y),
+             shear_z = hn::Set(d4, s.shear.z);
     const V4 ax = hn::Sub(a.x, hn::Mul(shear_x, a.z)), ay = hn::Sub(a.y, hn::Mul(shear_y, a.z));
     const V4 bx = hn::Sub(b.x, hn::Mul(shear_x, b.z)), by = hn::Sub(b.y, hn::Mul(shear_y, b.z));
     const V4 cx = hn::Sub(c.x, hn::Mul(shear_x, c.z)), cy = hn::Sub(c.y, hn::Mul(shear_y, c.z));
@@ -263,7 +274,8 @@ class Tracer {
     uint32_t left = bits_of(d4, hn::And(sound, hn::Not(hn::And(below, above)))) & ((1u << count) - 1);
     if (left == 0) return;
     const vec3 direction = Text::lsp_rotate(s.direction, s.axis);
-    const V4 t = plane_depth({hn::Set(d4, direction.x), hn::Set(d4, direction.y), hn::Set(d4, direction.z)}, shear_z, a, b, c);
+    const V4 t = plane_depth({hn::Set(d4, direction.x), hn::Set(d4, direction.y), hn::Set(d4, direction.z)},
+                             shear_z, a, b, c);
     left &= bits_of(d4, hn::And(hn::Gt(t, hn::Set(d4, s.tmin)), hn::Le(t, hn::Set(d4, best.t))));
     if (left == 0) return;
     HWY_ALIGN float ts[kLeafLanes], vs[kLeafLanes], ws[kLeafLanes], dets[kLeafLanes];
@@ -318,7 +330,8 @@ class Tracer {
     }
   }
 
-  // Of children `first` and those of `hits`, entered at t: the nearest is returned, the others wait, the farthest lowest.
+  // Of children `first` and those of `hits`, entered at t: the nearest is returned, the others wait, the
+  // farthest lowest.
   HWY_INLINE uint32_t push_farther(const LspWideNode& node, uint32_t ref, const float* t, uint32_t first,
                                    uint32_t hits, uint32_t& top) {
     const uint32_t bottom = top;

@@ -49,7 +49,9 @@ extern "C" lsp_status lsp_vulkan_plan_buffers(const lsp_scene* scene, uint32_t u
   plan->buffer_count = 1;
   plan->bytes = sizeof(LspHeader);
   plan->base_structure = scene->header->base_structure;
-  plan->exact_structure = (features & LSP_FEATURE_WIDE) != 0 ? LSP_BASE_WIDE : cells ? LSP_BASE_BVH : plan->base_structure;
+  plan->exact_structure = (features & LSP_FEATURE_WIDE) != 0 ? LSP_BASE_WIDE
+                          : cells                            ? LSP_BASE_BVH
+                                                             : plan->base_structure;
   plan->addresses = (uses & LSP_USE_ADDRESSES_ALWAYS) != 0 ? 1 : 0;
   for (const Wanted& wanted : kWanted) {
     if ((uses & wanted.uses) == 0) continue;

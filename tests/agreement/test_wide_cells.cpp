@@ -1,5 +1,5 @@
-// Rays of cells across vector lanes have the bits of rays one after the other, in every instruction set that
-// runs here.
+// Rays across vector lanes, of cells and exact ones through wide nodes, have the bits of rays one after the
+// other, in every instruction set that runs here.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,6 +15,7 @@
 #include "rays.h"
 #include "surface_rays.h"
 #include "trace_cells_wide.h"
+#include "trace_wide_lanes.h"
 
 namespace lsp::test {
 namespace {
@@ -223,6 +224,81 @@ TEST_P(WideCellsTest, SameBitsOfDamagedFiles) {
     }
   }
 }
+
+// By the number of an instruction set.
+class WideExactTest : public testing::TestWithParam<size_t> {
+ protected:
+  const WideExact& wide_ = kWideExact[GetParam()];
+  void SetUp() override {
+    if (!wide_.runs_here()) GTEST_SKIP() << "this CPU does not have " << wide_.name;
+  }
+};
+
+TEST_P(WideExactTest, SameBitsAsSingleRays) {
+  for (const Scene& of : scenes()) {
+    const lsp_scene scene = view(of.baked);
+    ASSERT_NE(scene.wide_nodes, nullptr) << of.name;
+    const std::vector<LspRay> rays = rays_of(of.baked);
+    std::vector<LspHit> wide(rays.size());
+    for (const uint32_t any : {0u, LSP_TRACE_ANY_HIT}) {
+      const auto single = single_rays(scene, {any, 0, 0, 0}, rays);
+      EXPECT_GT(std::count_if(single.begin(), single.end(),
+                              [](const LspHit& h) { return h.primitive != LSP_NONE; }),
+                500)
+          << of.name;
+      wide_.trace(scene, any != 0, rays.data(), wide.data(), rays.size());
+      expect_same(single, wide, rays, std::string(of.name) + ", any " + std::to_string(any));
+    }
+  }
+}
+
+// Where products of positions and reciprocals overflow the text of single rays answers.
+TEST_P(WideExactTest, SameBitsInHugeScenes) {
+  for (const float scale : {1e13f, 1e17f}) {
+    Mesh mesh = sphere(8);
+    move(mesh, scale, {0, 0, 0});
+    const lsp::Baked baked = bake_cells(mesh, 4);
+    const lsp_scene scene = view(baked);
+    const std::vector<LspRay> rays = rays_of(baked);
+    std::vector<LspHit> wide(rays.size());
+    const auto single = single_rays(scene, {0, 0, 0, 0}, rays);
+    wide_.trace(scene, false, rays.data(), wide.data(), rays.size());
+    expect_same(single, wide, rays, "scaled by " + std::to_string(scale));
+  }
+}
+
+// Nodes that say anything at all: the trace ends, reads nothing outside, and says where it could not finish.
+TEST_P(WideExactTest, EndsOnDamagedFiles) {
+  std::mt19937 random(5);
+  for (int round = 0; round < 12; ++round) {
+    lsp::Baked baked = bake_cells(sphere(12), 6);
+    const std::vector<LspRay> rays = surface_rays(baked, 2000, 1);
+    auto* bytes = reinterpret_cast<uint8_t*>(baked.wide.nodes.data());
+    const size_t size = baked.wide.nodes.size() * sizeof(LspWideNode);
+    for (size_t k = 0; k < size / 64 + 1; ++k) bytes[random() % size] = static_cast<uint8_t>(random());
+    // One that names itself, over and over.
+    baked.wide.nodes[0].node_first = 0;
+    const lsp_scene scene = view(baked);
+    std::vector<LspHit> hits(rays.size());
+    for (const bool any : {false, true}) {
+      wide_.trace(scene, any, rays.data(), hits.data(), rays.size());
+      for (const LspHit& hit : hits)
+        ASSERT_TRUE(hit.primitive == LSP_NONE || hit.primitive < baked.header.primitive_count);
+    }
+  }
+}
+
+size_t compiled_exact() {
+  size_t count = 0;
+  while (kWideExact[count].name != nullptr) ++count;
+  return count;
+}
+INSTANTIATE_TEST_SUITE_P(Sets, WideExactTest, testing::Range(size_t{0}, compiled_exact()),
+                         [](const auto& of) {
+                           std::string name = kWideExact[of.param].name;
+                           std::erase(name, '-');
+                           return name;
+                         });
 
 size_t compiled() {
   size_t count = 0;

@@ -4,7 +4,7 @@
 
 #include "context.h"
 #include "ray_errors.h"
-#include "wide_tree.h"
+#include "wide_peer.h"
 
 namespace lsp::bench {
 namespace {

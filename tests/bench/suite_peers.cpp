@@ -3,7 +3,7 @@
 
 #include "context.h"
 #include "ray_errors.h"
-#include "wide_tree.h"
+#include "wide_peer.h"
 
 namespace lsp::bench {
 namespace {
@@ -25,10 +25,10 @@ Section peers_suite(Context& context) {
       "any user "
       "has to. Ours writes 32-byte hits with shading normals, the wide tree too, Embree distance, primitive "
       "and "
-      "weights. The wide tree is the file's own binary tree collapsed to eight children a node, traversed "
-      "with SIMD "
-      "(" +
-      std::string(wide_target()) + " here): what the tables of a Line Space are up against on a CPU.");
+      "weights. The wide tree is the file's own binary tree made into the nodes of eight children that files "
+      "of cells "
+      "have for exact rays, and traced by the library: what the tables of a Line Space are up against on a "
+      "CPU.");
   Table table{
       "peers", "Million rays a second", "The factor is against our exact trace of the same rays.", {}, {}};
   table.columns = {{"scene", "scene"},         {"rays", "rays"},
