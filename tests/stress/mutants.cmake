@@ -39,9 +39,9 @@ lsp_variant(edges_are_outside traverse.h
   "(u < 0.0f || v < 0.0f || w < 0.0f) && (u > 0.0f || v > 0.0f || w > 0.0f)"
   "!(u > 0.0f && v > 0.0f && w > 0.0f) && !(u < 0.0f && v < 0.0f && w < 0.0f)")
 lsp_variant(farther_wins traverse.h
-  "if (t > s.tmin && t < best.t) {" "if (t > s.tmin && (t < best.t || best.triangle != LSP_NONE)) {")
+  "if (t > s.tmin && nearer) {" "if (t > s.tmin && (nearer || best.triangle != LSP_NONE)) {")
 lsp_variant(tmin_ignored traverse.h
-  "if (t > s.tmin && t < best.t) {" "if (t < best.t) {")
+  "if (t > s.tmin && nearer) {" "if (nearer) {")
 lsp_variant(near_child_only bvh.h
   "if (lsp_stack_t[next.top] <= best_t) next.ref = lsp_stack_ref[next.top];"
   "if (lsp_stack_t[next.top] > best_t) next.ref = lsp_stack_ref[next.top];")

@@ -43,6 +43,7 @@ Mesh mesh_of(const Triangles& triangles) {
 void bake_to(const fs::path& path, const Triangles& triangles, const SceneOptions& options) {
   BakeOptions bake_options;
   bake_options.base = options.base;
+  bake_options.cells = 2;  // of few cells: what is asked of them is their exact rays
   bake_options.line_space.resolution = options.resolution;
   bake_options.line_space.depths = options.base == Base::kNTree ? std::vector<uint32_t>{1} : options.depths;
   Baked baked = bake(mesh_of(triangles), bake_options);
@@ -97,14 +98,16 @@ Triangles placed(Triangles triangles, float scale, glm::vec3 offset) {
 
 std::vector<StressScene> family_scenes() {
   std::vector<StressScene> made;
-  const SceneOptions ntree{Base::kNTree, 4, {}};
+  const SceneOptions ntree{Base::kNTree, 4, {}}, cells{Base::kCells, 4, {}};
   made.emplace_back("room", room());
   made.emplace_back("room_ntree", room(), ntree);
+  made.emplace_back("room_cells", room(), cells);
   made.emplace_back("room_small", placed(room(), 1e-6f, glm::vec3(0)));
   made.emplace_back("room_small_ntree", placed(room(), 1e-6f, glm::vec3(0)), ntree);
   made.emplace_back("room_large", placed(room(), 1e6f, glm::vec3(0)));
   made.emplace_back("room_away", placed(room(), 3, glm::vec3(1000, -2000, 500)));
   made.emplace_back("room_away_ntree", placed(room(), 3, glm::vec3(1000, -2000, 500)), ntree);
+  made.emplace_back("room_away_cells", placed(room(), 3, glm::vec3(1000, -2000, 500)), cells);
   made.emplace_back("room_moved", placed(room(), 1, glm::vec3(-0.5f)));
   return made;
 }

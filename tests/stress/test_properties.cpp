@@ -92,7 +92,7 @@ class Symmetries : public testing::TestWithParam<Symmetry> {};
 TEST_P(Symmetries, ChangeNoExactAnswer) {
   const Symmetry& symmetry = GetParam();
   const bool longer = std::string(symmetry.name) == "longer_direction";
-  for (const Base base : {Base::kBvh, Base::kNTree}) {
+  for (const Base base : {Base::kBvh, Base::kNTree, Base::kCells}) {
     Triangles triangles = ball_in_room();
     const StressScene before("before", triangles, {base, 1, {0}});
     for (auto& t : triangles) {
@@ -128,7 +128,7 @@ INSTANTIATE_TEST_SUITE_P(Stress, Symmetries, testing::ValuesIn(kSymmetries),
 // ---- leaks -----------------------------------------------------------------------------------------------
 
 TEST(Closed, RoomsOfEveryScaleDoNotLeak) {
-  for (const Base base : {Base::kBvh, Base::kNTree}) {
+  for (const Base base : {Base::kBvh, Base::kNTree, Base::kCells}) {
     for (const float scale : {1e-6f, 1e-3f, 1.0f, 1e3f, 1e6f}) {
       for (const float away : {0.0f, 0.7f, 1e3f, 1e5f}) {
         const StressScene scene("room", placed(room(), scale, scale * away * glm::vec3(1, -0.3f, 0.77f)),

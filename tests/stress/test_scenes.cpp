@@ -23,7 +23,10 @@
 #include "verdict.h"
 
 namespace lsp {
-void PrintTo(Base base, std::ostream* out) { *out << (base == Base::kBvh ? "BVH" : "NTree"); }
+const char* name_of(Base base) {
+  return base == Base::kBvh ? "BVH" : base == Base::kNTree ? "NTree" : "Cells";
+}
+void PrintTo(Base base, std::ostream* out) { *out << name_of(base); }
 }  // namespace lsp
 
 namespace lsp::stress {
@@ -129,6 +132,7 @@ const std::vector<Case>& cases() {
                         // hold all triangles.
        [](Base base) {
          if (base == Base::kNTree) return in_one_point(long_run() ? 3000 : 16);
+         if (base == Base::kCells) return in_one_point(1000);  // a cell has room for 8192
          return in_one_point(long_run() ? 1000000 : 3000);
        }},
       {"huge_triangles",
@@ -213,10 +217,12 @@ TEST_P(Scenes, BakeValidateAndTraceRight) {
 
 INSTANTIATE_TEST_SUITE_P(Stress, Scenes,
                          testing::Combine(testing::ValuesIn(cases()),
-                                          testing::Values(Base::kBvh, Base::kNTree)),
+                                          testing::Values(Base::kBvh, Base::kNTree, Base::kCells)),
                          [](const auto& info) {
                            return std::string(std::get<0>(info.param).name) +
-                                  (std::get<1>(info.param) == Base::kBvh ? "" : "_ntree");
+                                  (std::get<1>(info.param) == Base::kBvh     ? ""
+                                   : std::get<1>(info.param) == Base::kNTree ? "_ntree"
+                                                                             : "_cells");
                          });
 
 // Every file ends in a file that lsp-validate passes, or in one of the exit codes for input that is not good;

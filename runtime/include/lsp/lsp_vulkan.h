@@ -157,10 +157,10 @@ LSP_API void lsp_vulkan_record_upload_barrier(const lsp_vulkan_functions* functi
 LSP_API uint32_t lsp_vulkan_parts(const lsp_scene* scene);
 
 /* SPIR-V (for Vulkan 1.1) of the trace shader for scenes planned like `plan` (of cells: for approximate rays;
- * for exact ones set base_structure of a copy to its exact_structure), entry point "main"; with `counting` nonzero
- * the one that adds to the counters. Only base_structure and addresses of the plan matter; with addresses the
- * device's bufferDeviceAddress feature must be on, else no feature is needed. Sets *bytes to the size. The
- * words live as long as the program. */
+ * for exact ones set base_structure of a copy to its exact_structure), entry point "main"; with `counting`
+ * nonzero the one that adds to the counters. Only base_structure and addresses of the plan matter; with
+ * addresses the device's bufferDeviceAddress feature must be on, else no feature is needed. Sets *bytes to
+ * the size. The words live as long as the program. */
 LSP_API const uint32_t* lsp_vulkan_trace_spirv(const lsp_vulkan_plan* plan, int counting, size_t* bytes);
 
 /* The bindings of its descriptor set layout. */

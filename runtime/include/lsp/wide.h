@@ -41,7 +41,7 @@ LSP_FN uint lsp_wide_key(LspSetup s, LspQuery q, LspWideNode node, vec3 lo, vec3
   precise vec3 box_hi = corner + step * hi;
   float t = lsp_box(s, box_lo, box_hi, best_t);
   uint distance = (q.flags & LSP_TRACE_ANY_HIT) != 0u ? 0u : floatBitsToUint(lsp_max(0.0f, t)) & ~7u;
-  return t <= best_t ? distance | number : LSP_NONE;
+  return t <= best_t && lo.x <= hi.x ? distance | number : LSP_NONE; /* inside out: there is no child */
 }
 
 LSP_FN float lsp_wide_byte(uint word, uint shift) { return float((word >> shift) & 0xFFu); }
@@ -150,8 +150,9 @@ LSP_STEP void lsp_advance(LspScene scene, LspSetup s, LspQuery q) {
   uint leaf = LSP_NONE;
   bool cut = false;
   bool going = true;
-  while (going && step < most) {
-    if (visit != LSP_NONE) {
+  while (going) {
+    cut = visit != LSP_NONE && step >= most;
+    if (visit != LSP_NONE && !cut) {
       LspWideHits hits = lsp_wide_hits(s, q, lsp_load_wide_node(scene, visit), best_t);
       node = visit;
       rest = hits.rest;
@@ -165,14 +166,16 @@ LSP_STEP void lsp_advance(LspScene scene, LspSetup s, LspQuery q) {
       rest = lsp_stack_rest[top];
       t = lsp_stack_t[top];
     }
-    going = !lsp_wide_over(rest, t, best_t);
+    going = !cut && !lsp_wide_over(rest, t, best_t);
     if (going) {
       LspWideChild child = lsp_load_wide_child(scene, node, rest & 7u);
       rest = ((rest >> 3u) & 0x1FFFFFu) | ((rest >> 24u) - 1u) << 24u;
       going = (child.bits & LSP_WIDE_NODE_BIT) != 0u;
       if (!going) {
+        cut = step >= most;
         leaf = LSP_LEAF_BIT | ((child.bits >> LSP_WIDE_LEAF_COUNT_SHIFT) & LSP_LEAF_COUNT_MASK) << LSP_LEAF_COUNT_SHIFT |
                ((child.triangle_first + (child.bits & LSP_WIDE_LEAF_FIRST_MASK)) & LSP_LEAF_FIRST_MASK);
+        leaf = cut ? LSP_NONE : leaf;
         ++step;
       } else {
         visit = child.node_first + (child.bits & ~LSP_WIDE_NODE_BIT);
