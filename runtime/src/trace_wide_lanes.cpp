@@ -206,7 +206,14 @@ class Tracer {
       hn::Store(first, d8, entries + part * kLanes);
       hits |= bits_of(d8, hn::Le(first, last)) << (part * kLanes);
     }
-    return hits;
+    // To a ray from far away boxes that are inside out are as wide as others.
+    const hn::CappedTag<uint16_t, kChildren> d_child;
+    uint32_t there = 0;
+    for (size_t i = 0; i < kChildren; i += hn::MaxLanes(d_child)) {
+      const auto children = hn::LoadU(d_child, reinterpret_cast<const uint16_t*>(node.children) + i);
+      there |= bits_of(d_child, hn::Ne(children, hn::Set(d_child, uint16_t{LSP_WIDE_NO_CHILD}))) << i;
+    }
+    return hits & there;
   }
 
   static HWY_INLINE uint32_t reference_of(const LspWideNode& node, uint32_t child) {
