@@ -1,0 +1,63 @@
+// Instances that own their memory: the thin C++ side of lsp_instances.h. Header-only.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "lsp/lsp_instances.h"
+#include "lsp/program.h"
+
+namespace lsp {
+
+// Built from scenes and places, and again as places change; memory is kept from one time to the next. Errors
+// are thrown as lsp::Failure. Tracing is const and may be done from any number of threads, but not while
+// build runs.
+class Instances {
+ public:
+  // No instances: every ray misses.
+  Instances() = default;
+  Instances(std::vector<const lsp_scene*> assets, std::span<const lsp_instance> instances)
+      : assets_(std::move(assets)) {
+    build(instances);
+  }
+
+  // The scenes named by lsp_instance.asset; they must outlive this.
+  const std::vector<const lsp_scene*>& assets() const { return assets_; }
+
+  // Puts the instances, all of them, at other places. After a failure there are none.
+  void build(std::span<const lsp_instance> instances) {
+    if (instances.size() > LSP_MAX_INSTANCES)
+      throw Failure(Exit::kLimit, "", std::to_string(instances.size()) + " instances are too many");
+    const auto count = static_cast<uint32_t>(instances.size());
+    memory_.resize(lsp_instances_bytes(count) / sizeof(Block) + 1);
+    lsp_error error;
+    const lsp_status status =
+        lsp_instances_build(assets_.data(), static_cast<uint32_t>(assets_.size()), instances.data(), count,
+                            memory_.data(), memory_.size() * sizeof(Block), &view_, &error);
+    if (status != LSP_OK) throw Failure(static_cast<Exit>(status), "", error.message);
+  }
+
+  // `rays` and `hits` are of one size. Adds to *counts unless it is null.
+  void trace(const lsp_trace_options& options, uint32_t mask, std::span<const LspRay> rays,
+             std::span<LspHit> hits, lsp_trace_counts* counts = nullptr) const {
+    lsp_error error;
+    const lsp_status status =
+        lsp_trace_instances(&view_, &options, mask, rays.data(), hits.data(), rays.size(), counts, &error);
+    if (status != LSP_OK) throw Failure(static_cast<Exit>(status), "", error.message);
+  }
+
+  const lsp_instances& view() const { return view_; }
+  const lsp_instance& operator[](uint32_t number) const { return view_.records[number].instance; }
+  uint32_t size() const { return view_.count; }
+
+ private:
+  struct alignas(16) Block {
+    unsigned char bytes[16];
+  };
+  std::vector<const lsp_scene*> assets_;
+  std::vector<Block> memory_;
+  lsp_instances view_{};
+};
+
+}  // namespace lsp
