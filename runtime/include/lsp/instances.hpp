@@ -3,6 +3,8 @@
 
 #include <cstdint>
 #include <span>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "lsp/lsp_instances.h"
@@ -21,6 +23,10 @@ class Instances {
       : assets_(std::move(assets)) {
     build(instances);
   }
+  Instances(const Instances&) = delete;  // the view would be of the other's memory
+  Instances& operator=(const Instances&) = delete;
+  Instances(Instances&&) = default;  // what is left may be destroyed or assigned to
+  Instances& operator=(Instances&&) = default;
 
   // The scenes named by lsp_instance.asset; they must outlive this.
   const std::vector<const lsp_scene*>& assets() const { return assets_; }
