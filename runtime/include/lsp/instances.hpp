@@ -1,8 +1,9 @@
 // Instances that own their memory: the thin C++ side of lsp_instances.h. Header-only.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
-#include <span>
+#include <iterator>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,6 +13,21 @@
 
 namespace lsp {
 
+// Elements side by side, of a vector, an array, a span or a pointer: not owned. C++17 has no std::span.
+template <class T>
+class View {
+ public:
+  View(T* data, size_t size) : data_(data), size_(size) {}
+  template <class Range>
+  View(Range&& range) : data_(std::data(range)), size_(std::size(range)) {}
+  T* data() const { return data_; }
+  size_t size() const { return size_; }
+
+ private:
+  T* data_;
+  size_t size_;
+};
+
 // Built from scenes and places, and again as places change; memory is kept from one time to the next. Errors
 // are thrown as lsp::Failure. Tracing is const and may be done from any number of threads, but not while
 // build runs.
@@ -19,7 +35,7 @@ class Instances {
  public:
   // No instances: every ray misses.
   Instances() = default;
-  Instances(std::vector<const lsp_scene*> assets, std::span<const lsp_instance> instances)
+  Instances(std::vector<const lsp_scene*> assets, View<const lsp_instance> instances)
       : assets_(std::move(assets)) {
     build(instances);
   }
@@ -32,7 +48,7 @@ class Instances {
   const std::vector<const lsp_scene*>& assets() const { return assets_; }
 
   // Puts the instances, all of them, at other places. After a failure there are none.
-  void build(std::span<const lsp_instance> instances) {
+  void build(View<const lsp_instance> instances) {
     if (instances.size() > LSP_MAX_INSTANCES)
       throw Failure(Exit::kLimit, "", std::to_string(instances.size()) + " instances are too many");
     const auto count = static_cast<uint32_t>(instances.size());
@@ -45,8 +61,8 @@ class Instances {
   }
 
   // `rays` and `hits` are of one size. Adds to *counts unless it is null.
-  void trace(const lsp_trace_options& options, uint32_t mask, std::span<const LspRay> rays,
-             std::span<LspHit> hits, lsp_trace_counts* counts = nullptr) const {
+  void trace(const lsp_trace_options& options, uint32_t mask, View<const LspRay> rays, View<LspHit> hits,
+             lsp_trace_counts* counts = nullptr) const {
     lsp_error error;
     const lsp_status status =
         lsp_trace_instances(&view_, &options, mask, rays.data(), hits.data(), rays.size(), counts, &error);
