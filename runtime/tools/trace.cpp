@@ -99,17 +99,7 @@ class Scene {
   uint64_t bytes_mapped() const { return bytes_mapped_; }
   bool any_has(uint32_t features) const { return (features_ & features) != 0; }
 
-  // What of the options has no meaning for any of the files.
-  std::vector<std::string> unused(const TraceArguments& arguments, bool approximate) const {
-    std::vector<std::string> notes;
-    for (const LspHeader* header : headers_) {
-      const std::vector<std::string> here = unused_arguments(arguments, approximate, *header);
-      if (header == headers_.front()) notes = here;
-      std::erase_if(notes,
-                    [&](const auto& n) { return std::find(here.begin(), here.end(), n) == here.end(); });
-    }
-    return notes;
-  }
+  const std::vector<const LspHeader*>& headers() const { return headers_; }
 
  private:
   void add(const SceneFile& file) {
@@ -222,7 +212,7 @@ Exit run(const Options& options) {
   const TraceRequest request = make_request(options, scene);
   if (!options.common.quiet) {
     const bool approximate = (request.options.flags & LSP_TRACE_APPROXIMATE) != 0;
-    for (const std::string& note : scene.unused(options.trace, approximate))
+    for (const std::string& note : unused_arguments(options.trace, approximate, scene.headers()))
       std::cerr << "lsp-trace: " << options.file << ": " << note << "\n";
   }
   nlohmann::ordered_json json;
