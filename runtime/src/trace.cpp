@@ -5,6 +5,7 @@
 #include "lsp/lsp.h"
 #include "trace_cells.h"
 #include "trace_loops.h"
+#include "trace_options.h"
 #ifdef LSP_SIMD
 #include "trace_cells_wide.h"
 #include "trace_wide_lanes.h"
@@ -44,22 +45,31 @@ extern "C" float lsp_hit_offset(const lsp_scene* scene, const LspHit* hit) {
   return header.cells.size > 0 ? LSP_OFFSET_CELL * header.cells.size : LSP_OFFSET_LINE_SPACE * diagonal;
 }
 
+lsp_status lsp::check_options(const lsp_trace_options& options, lsp_error* error) {
+  if (const uint32_t unknown = options.flags & ~(LSP_TRACE_ALL_FLAGS | LSP_TRACE_MAX_LOSS); unknown != 0)
+    return fail(error, LSP_ERROR_UNSUPPORTED, 0,
+                "library version %s does not know trace flags 0x%x: leave them out or link a newer one",
+                LSP_LIBRARY_VERSION_STRING, unknown);
+  if (options.quality >= LSP_QUALITY_COUNT)
+    return fail(error, LSP_ERROR_UNSUPPORTED, 0,
+                "library version %s does not know quality %u: use LSP_QUALITY_*", LSP_LIBRARY_VERSION_STRING,
+                options.quality);
+  return LSP_OK;
+}
+
+lsp_status lsp::check_scene(const lsp_scene& scene, const lsp_trace_options& options, lsp_error* error) {
+  if (is_approximate(scene, options) || (scene.header->required_features & LSP_FEATURE_EXACT) != 0)
+    return LSP_OK;
+  return fail(error, LSP_ERROR_UNSUPPORTED, 0,
+              "the file has no exact tree, trace it approximately or bake it without --no-exact");
+}
+
 extern "C" lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options* options, const LspRay* rays,
                                 LspHit* hits, uint64_t count, lsp_trace_counts* counts, lsp_error* error) {
-  if (const uint32_t unknown = options->flags & ~(LSP_TRACE_ALL_FLAGS | LSP_TRACE_MAX_LOSS); unknown != 0)
-    return lsp::fail(error, LSP_ERROR_UNSUPPORTED, 0,
-                     "library version %s does not know trace flags 0x%x: leave them out or link a newer one",
-                     LSP_LIBRARY_VERSION_STRING, unknown);
-  if (options->quality >= LSP_QUALITY_COUNT)
-    return lsp::fail(error, LSP_ERROR_UNSUPPORTED, 0,
-                     "library version %s does not know quality %u: use LSP_QUALITY_*",
-                     LSP_LIBRARY_VERSION_STRING, options->quality);
+  if (const lsp_status status = lsp::check_options(*options, error); status != LSP_OK) return status;
+  if (const lsp_status status = lsp::check_scene(*scene, *options, error); status != LSP_OK) return status;
   const uint32_t features = scene->header->required_features;
-  const bool approximate = (options->flags & LSP_TRACE_APPROXIMATE) != 0 &&
-                           (features & (LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS)) != 0;
-  if (!approximate && !(features & LSP_FEATURE_EXACT))
-    return lsp::fail(error, LSP_ERROR_UNSUPPORTED, 0,
-                     "the file has no exact tree, trace it approximately or bake it without --no-exact");
+  const bool approximate = lsp::is_approximate(*scene, *options);
   const bool partial = (features & LSP_FEATURE_COVERAGE) != 0;
   if (approximate && (features & LSP_FEATURE_CELLS) != 0) {
 #ifdef LSP_SIMD

@@ -1,6 +1,7 @@
-// lsp-trace: traces a file of rays against an .lsp file.
+// lsp-trace: traces a file of rays against an .lsp file or a scene of instances.
 #include <algorithm>
 #include <iostream>
+#include <optional>
 #include <thread>
 
 #include <unistd.h>
@@ -8,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "lsp/command_line.h"
+#include "lsp/instanced_scene.hpp"
 #include "lsp/scene_file.hpp"
 #include "lsp/trace_arguments.hpp"
 #include "ray_files.h"
@@ -33,12 +35,14 @@ struct Options {
 
 void define(CLI::App& app, Options& options) {
   add_common_options(app, "lsp-trace", options.common);
-  app.add_option("FILE.lsp", options.file, "The scene")->required();
+  app.add_option("FILE.lsp", options.file,
+                 "The scene: an .lsp file, or .json with instances of several (CPU alone)")
+      ->required();
   app.add_option("--rays", options.rays, "Rays: 32 bytes each, origin, tmin, direction, tmax as float32")
       ->required();
   app.add_option("--hits", options.hits,
                  "Hits to write: 32 bytes each, t, primitive, u, v, normal as float32 (primitive uint32), "
-                 "flags uint32")
+                 "flags uint32, from bit 8 on the instance's number")
       ->required();
   app.add_option("--backend", options.backend, "Where to trace")->check(CLI::IsMember({"cpu", "vulkan"}));
   app.add_option("--mode", options.mode,
@@ -69,9 +73,56 @@ double median(std::vector<double> values) {
 
 double per(double sum, uint64_t count) { return count == 0 ? 0.0 : sum / static_cast<double>(count); }
 
-TraceRequest make_request(const Options& options, const LspHeader& header) {
+// What a packed file may grow to: the machine's memory.
+uint64_t physical_memory() {
+  const long pages = sysconf(_SC_PHYS_PAGES);
+  const long page = sysconf(_SC_PAGESIZE);
+  return pages > 0 && page > 0 ? static_cast<uint64_t>(pages) * static_cast<uint64_t>(page) : UINT64_MAX;
+}
+
+// What a program's argument names: one file, or several and their instances.
+class Scene {
+ public:
+  explicit Scene(const std::string& path) {
+    if (is_instanced_scene(path)) {
+      scene_.emplace(path, physical_memory());
+      for (const auto& asset : scene_->assets()) add(*asset);
+      target_.instances = &scene_->instances().view();
+    } else {
+      file_.emplace(path, physical_memory());
+      add(*file_);
+      target_.scene = &file_->scene();
+    }
+  }
+  const TraceTarget& target() const { return target_; }
+  const InstancedScene* instanced() const { return scene_ ? &*scene_ : nullptr; }
+  uint64_t bytes_mapped() const { return bytes_mapped_; }
+  bool any_has(uint32_t features) const { return (features_ & features) != 0; }
+
+  const std::vector<const LspHeader*>& headers() const { return headers_; }
+
+ private:
+  void add(const SceneFile& file) {
+    headers_.push_back(&file.header());
+    features_ |= file.header().required_features;
+    bytes_mapped_ += file.bytes_mapped();
+    if (file.unpacked())
+      ++target_.unpacked;
+    else
+      target_.mapped.push_back(&file.scene());
+  }
+
+  std::optional<SceneFile> file_;
+  std::optional<InstancedScene> scene_;
+  std::vector<const LspHeader*> headers_;
+  uint32_t features_ = 0;
+  uint64_t bytes_mapped_ = 0;
+  TraceTarget target_;
+};
+
+TraceRequest make_request(const Options& options, const Scene& scene) {
   TraceRequest request;
-  const bool line_spaces = (header.required_features & (LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS)) != 0;
+  const bool line_spaces = scene.any_has(LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS);
   const bool approximate = options.mode.empty() ? line_spaces : options.mode == "approximate";
   request.options = to_trace_options(options.trace, approximate);
   if (options.query == "any") request.options.flags |= LSP_TRACE_ANY_HIT;
@@ -85,13 +136,17 @@ TraceRequest make_request(const Options& options, const LspHeader& header) {
   return request;
 }
 
-nlohmann::ordered_json to_json(const Options& options, const TraceRequest& request, const SceneFile& file,
+nlohmann::ordered_json to_json(const Options& options, const TraceRequest& request, const Scene& scene,
                                const TraceReport& report) {
   const lsp_trace_counts& counts = report.counts;
   nlohmann::ordered_json json;
   json["program"] = "lsp-trace";
   json["version"] = kProgramVersion;
   json["file"] = options.file;
+  if (const InstancedScene* instanced = scene.instanced(); instanced != nullptr) {
+    json["instances"] = instanced->instances().size();
+    json["assets"] = instanced->assets().size();
+  }
   json["backend"] = options.backend;
   json["mode"] = (request.options.flags & LSP_TRACE_APPROXIMATE) != 0 ? "approximate" : "exact";
   json["query"] = options.query;
@@ -109,12 +164,12 @@ nlohmann::ordered_json to_json(const Options& options, const TraceRequest& reque
   json["load_path"] = report.load_path;
   if (!report.load_note.empty()) json["load_note"] = report.load_note;
   if (request.vulkan) json["load_seconds"] = report.load_seconds;
-  json["bytes_mapped"] = file.bytes_mapped();
+  json["bytes_mapped"] = scene.bytes_mapped();
   json["bytes_paged_in"] = report.bytes_paged_in;
   json["bytes_imported"] = report.bytes_imported;
   json["bytes_uploaded"] = report.bytes_uploaded;
   json["retraced"] = report.retraced;
-  if ((file.scene().header->required_features & LSP_FEATURE_CELLS) != 0) {
+  if (scene.any_has(LSP_FEATURE_CELLS)) {
     json["quality"] = options.trace.quality_name();
     if (options.trace.max_loss >= 0) json["max_loss"] = options.trace.max_loss;
     json["steps_per_ray"] = per(static_cast<double>(counts.nodes), counts.rays);
@@ -150,26 +205,19 @@ void print(const nlohmann::ordered_json& json) {
   }
 }
 
-// What a packed file may grow to: the machine's memory.
-uint64_t physical_memory() {
-  const long pages = sysconf(_SC_PHYS_PAGES);
-  const long page = sysconf(_SC_PAGESIZE);
-  return pages > 0 && page > 0 ? static_cast<uint64_t>(pages) * static_cast<uint64_t>(page) : UINT64_MAX;
-}
-
 Exit run(const Options& options) {
-  const SceneFile file(options.file, physical_memory());
+  const Scene scene(options.file);
   const std::vector<LspRay> rays = read_rays(options.rays);
   std::vector<LspHit> hits(rays.size());
-  const TraceRequest request = make_request(options, file.header());
+  const TraceRequest request = make_request(options, scene);
   if (!options.common.quiet) {
     const bool approximate = (request.options.flags & LSP_TRACE_APPROXIMATE) != 0;
-    for (const std::string& note : unused_arguments(options.trace, approximate, file.header()))
+    for (const std::string& note : unused_arguments(options.trace, approximate, scene.headers()))
       std::cerr << "lsp-trace: " << options.file << ": " << note << "\n";
   }
   nlohmann::ordered_json json;
   try {
-    json = to_json(options, request, file, trace_rays(file.scene(), file.unpacked(), request, rays, hits));
+    json = to_json(options, request, scene, trace_rays(scene.target(), request, rays, hits));
   } catch (const Failure& failure) {
     // The tracers do not know the file's name.
     throw Failure(failure.exit(), failure.file().empty() ? options.file : failure.file(), failure.what());
@@ -187,7 +235,9 @@ Exit run(const Options& options) {
 }  // namespace lsp
 
 int main(int argc, char** argv) {
-  CLI::App app("Traces a file of rays against an .lsp file and writes a file of hits.");
+  CLI::App app(
+      "Traces a file of rays against an .lsp file, or a scene of instances of several, and writes a file of "
+      "hits.");
   lsp::Options options;
   lsp::define(app, options);
   return lsp::run_program("lsp-trace", app, argc, argv, [&] { return lsp::run(options); });

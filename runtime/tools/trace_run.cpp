@@ -51,8 +51,18 @@ std::string cpu_name() {
   return "CPU";
 }
 
+lsp_status trace_part(const TraceTarget& target, const lsp_trace_options& options,
+                      std::span<const LspRay> rays, LspHit* hits, lsp_trace_counts* counts,
+                      lsp_error* error) {
+  constexpr uint32_t kAll = 0xFF;
+  if (target.instances != nullptr)
+    return lsp_trace_instances(target.instances, &options, kAll, rays.data(), hits, rays.size(), counts,
+                               error);
+  return lsp_trace(target.scene, &options, rays.data(), hits, rays.size(), counts, error);
+}
+
 // All rays once, by request.threads threads that take chunks as they get to them.
-void trace_cpu(const lsp_scene& scene, const TraceRequest& request, std::span<const LspRay> rays,
+void trace_cpu(const TraceTarget& target, const TraceRequest& request, std::span<const LspRay> rays,
                std::span<LspHit> hits, lsp_trace_counts* counts,
                const std::function<void(size_t)>& progress) {
   const size_t chunks = (rays.size() + kChunkRays - 1) / kChunkRays;
@@ -65,8 +75,8 @@ void trace_cpu(const lsp_scene& scene, const TraceRequest& request, std::span<co
     for (size_t chunk = next++; chunk < chunks; chunk = next++) {
       const size_t first = chunk * kChunkRays;
       const size_t size = std::min(kChunkRays, rays.size() - first);
-      if (lsp_trace(&scene, &request.options, &rays[first], &hits[first], size,
-                    counts != nullptr ? &sums[me] : nullptr, &errors[me]) != LSP_OK) {
+      if (trace_part(target, request.options, rays.subspan(first, size), &hits[first],
+                     counts != nullptr ? &sums[me] : nullptr, &errors[me]) != LSP_OK) {
         return;
       }
       if (me == 0) progress(first + size);
@@ -84,7 +94,7 @@ void trace_cpu(const lsp_scene& scene, const TraceRequest& request, std::span<co
   for (const lsp_trace_counts& sum : sums) lsp_add_counts(counts, &sum);
 }
 
-TraceReport trace_on_cpu(const lsp_scene& scene, const TraceRequest& request, std::span<const LspRay> rays,
+TraceReport trace_on_cpu(const TraceTarget& target, const TraceRequest& request, std::span<const LspRay> rays,
                          std::span<LspHit> hits, ProgressLine& line) {
   TraceReport report;
   report.device = cpu_name();
@@ -93,11 +103,11 @@ TraceReport trace_on_cpu(const lsp_scene& scene, const TraceRequest& request, st
   const auto progress = [&](size_t rays_done) {
     line.show((pass + static_cast<double>(rays_done) / static_cast<double>(rays.size())) / passes);
   };
-  trace_cpu(scene, request, rays, hits, &report.counts, progress);
+  trace_cpu(target, request, rays, hits, &report.counts, progress);
   for (uint32_t i = 0; i < request.repeats; ++i) {
     ++pass;
     const auto start = Clock::now();
-    trace_cpu(scene, request, rays, hits, nullptr, progress);
+    trace_cpu(target, request, rays, hits, nullptr, progress);
     report.seconds.push_back(seconds_since(start));
   }
   return report;
@@ -133,13 +143,16 @@ TraceReport trace_on_vulkan(const lsp_scene& scene, const TraceRequest& request,
 
 }  // namespace
 
-TraceReport trace_rays(const lsp_scene& scene, bool unpacked, const TraceRequest& request,
-                       std::span<const LspRay> rays, std::span<LspHit> hits) {
+TraceReport trace_rays(const TraceTarget& target, const TraceRequest& request, std::span<const LspRay> rays,
+                       std::span<LspHit> hits) {
+  if (request.vulkan && target.instances != nullptr)
+    throw Failure(Exit::kUnsupported, "", "instances are traced on the CPU alone; use --backend cpu");
   ProgressLine line(request.progress);
-  TraceReport report = request.vulkan ? trace_on_vulkan(scene, request, rays, hits, line)
-                                      : trace_on_cpu(scene, request, rays, hits, line);
-  if (report.load_path.empty()) report.load_path = unpacked ? "unpacked" : "mapped";
-  if (!unpacked) report.bytes_paged_in = resident_bytes(scene.bytes);
+  TraceReport report = request.vulkan ? trace_on_vulkan(*target.scene, request, rays, hits, line)
+                                      : trace_on_cpu(target, request, rays, hits, line);
+  if (report.load_path.empty())
+    report.load_path = target.unpacked > 0 && target.mapped.empty() ? "unpacked" : "mapped";
+  for (const lsp_scene* scene : target.mapped) report.bytes_paged_in += resident_bytes(scene->bytes);
   return report;
 }
 

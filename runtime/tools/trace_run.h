@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "lsp/lsp.h"
+#include "lsp/lsp_instances.h"
 #include "lsp/vulkan_device.hpp"
 
 namespace lsp {
@@ -35,9 +35,17 @@ struct TraceReport {
   lsp_trace_counts counts{};
 };
 
+// What is traced: a scene, or instances; one of the two is null.
+struct TraceTarget {
+  const lsp_scene* scene = nullptr;
+  const lsp_instances* instances = nullptr;
+  std::vector<const lsp_scene*> mapped;  // of the files traced, those that are mapped
+  size_t unpacked = 0;                   // how many were packed
+};
+
 // Traces `rays` into `hits`, first once with counting and without a clock, then request.repeats times timed.
-// Throws Failure.
-TraceReport trace_rays(const lsp_scene& scene, bool unpacked, const TraceRequest& request,
-                       std::span<const LspRay> rays, std::span<LspHit> hits);
+// Throws Failure: kUnsupported where instances are to be traced by Vulkan.
+TraceReport trace_rays(const TraceTarget& target, const TraceRequest& request, std::span<const LspRay> rays,
+                       std::span<LspHit> hits);
 
 }  // namespace lsp

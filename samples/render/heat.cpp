@@ -15,10 +15,10 @@ namespace {
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 enum Dimension : uint32_t { kPixelPoint, kDirection };
 
-LspHit trace(const lsp_scene& scene, const lsp_trace_options& options, const LspRay& ray,
+LspHit trace(const RenderScene& scene, const lsp_trace_options& options, const LspRay& ray,
              lsp_trace_counts* counts) {
   LspHit hit{};
-  lsp_trace(&scene, &options, &ray, &hit, 1, counts, nullptr);
+  scene.trace(options, {&ray, 1}, {&hit, 1}, counts);
   return hit;
 }
 
@@ -31,11 +31,13 @@ float loss(const LspHit& answer, const LspHit& truth) {
 
 float heat_of(const RenderScene& scene, const HeatOptions& options, const LspRay& ray) {
   lsp_trace_counts counts{};
-  const LspHit hit = trace(scene.view(), options.trace, ray, &counts);
-  const bool cells = (scene.view().header->required_features & LSP_FEATURE_CELLS) != 0;
+  const LspHit hit = trace(scene, options.trace, ray, &counts);
+  const bool cells = std::ranges::any_of(scene.headers(), [](const LspHeader* header) {
+    return (header->required_features & LSP_FEATURE_CELLS) != 0;
+  });
   switch (options.heat) {
     case Heat::kLoss:
-      return loss(hit, trace(scene.view(), {}, ray, nullptr));
+      return loss(hit, trace(scene, {}, ray, nullptr));
     case Heat::kSteps:
       return static_cast<float>(counts.nodes + counts.exact_nodes + counts.shafts + counts.triangles);
     case Heat::kExact:
@@ -60,7 +62,7 @@ HeatMap heat_map(const RenderScene& scene, const Camera& camera, const HeatOptio
     for (uint32_t sample = 0; sample < options.samples; ++sample) {
       const auto random = [&](Dimension d) { return sobol_point(sample, hash_combine(seed, d)); };
       const LspRay eye = camera.ray(corner + random(kPixelPoint), options.width, options.height);
-      const LspHit hit = trace(scene.view(), {}, eye, nullptr);
+      const LspHit hit = trace(scene, {}, eye, nullptr);
       if (!std::isfinite(hit.t)) continue;
       const SurfacePoint point = scene.surface(eye, hit);
       const glm::vec3 direction = cosine_direction(point.shading_normal, random(kDirection));

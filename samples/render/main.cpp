@@ -1,7 +1,9 @@
-// lsp-render: a picture of an .lsp file, its indirect light traced exactly or approximately.
+// lsp-render: a picture of an .lsp file or a scene of instances, its indirect light traced exactly or
+// approximately.
 #include <tbb/global_control.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -124,10 +126,12 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
   if (!common.quiet) {
     for (const std::string& note : scene.notes())
       std::cerr << program << ": " << arguments.file << ": " << note << "\n";
-    const LspHeader& header = *scene.view().header;
-    for (const std::string& note : unused_arguments(arguments.trace, approximate, header))
+    for (const std::string& note : unused_arguments(arguments.trace, approximate, scene.headers()))
       std::cerr << program << ": " << arguments.file << ": " << note << "\n";
-    if (approximate && (header.required_features & (LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS)) == 0) {
+    const bool tables = std::ranges::any_of(scene.headers(), [](const LspHeader* header) {
+      return (header->required_features & (LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS)) != 0;
+    });
+    if (approximate && !tables) {
       std::cerr << program << ": " << arguments.file
                 << ": neither Line Spaces nor cells in the file: approximate rays are exact\n";
     }
@@ -215,11 +219,16 @@ int main(int argc, char** argv) {
   using namespace lsp;
   using namespace lsp::sample;
   constexpr const char* kProgram = "lsp-render";
-  CLI::App app("Renders an .lsp file. Primary rays are exact; --mode governs indirect rays.", kProgram);
+  CLI::App app(
+      "Renders an .lsp file or a scene of instances of several. Primary rays are exact; --mode governs "
+      "indirect rays.",
+      kProgram);
   CommonOptions common;
   Arguments a;
   add_common_options(app, kProgram, common);
-  app.add_option("FILE.lsp", a.file, "The baked scene")->required();
+  app.add_option("FILE.lsp", a.file,
+                 "The baked scene: an .lsp file, or .json with instances of several (CPU alone)")
+      ->required();
   app.add_option("-o,--output", a.outputs,
                  "The picture: .png (tone-mapped) or .pfm (linear floats); may be given twice")
       ->required()

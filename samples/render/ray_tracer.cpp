@@ -15,18 +15,15 @@ namespace {
 class CpuTracer : public RayTracer {
  public:
   CpuTracer(const RenderScene& scene, int threads)
-      : scene_(scene.view()), arena_(threads > 0 ? threads : tbb::task_arena::automatic) {}
+      : scene_(scene), arena_(threads > 0 ? threads : tbb::task_arena::automatic) {}
 
   double trace(const lsp_trace_options& options, std::span<const LspRay> rays,
                std::span<LspHit> hits) override {
     const auto start = std::chrono::steady_clock::now();
     arena_.execute([&] {
       tbb::parallel_for(tbb::blocked_range<size_t>(0, rays.size(), 2048), [&](const auto& range) {
-        lsp_error error{};
-        if (lsp_trace(&scene_, &options, rays.data() + range.begin(), hits.data() + range.begin(),
-                      range.size(), nullptr, &error) != LSP_OK) {
-          throw Failure(static_cast<Exit>(error.status), "", error.message);
-        }
+        scene_.trace(options, rays.subspan(range.begin(), range.size()),
+                     hits.subspan(range.begin(), range.size()), nullptr);
       });
     });
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -38,13 +35,13 @@ class CpuTracer : public RayTracer {
   std::string load_path() const override { return "mapped"; }
 
  private:
-  const lsp_scene& scene_;
+  const RenderScene& scene_;
   tbb::task_arena arena_;
 };
 
 class VulkanRayTracer : public RayTracer {
  public:
-  VulkanRayTracer(const RenderScene& scene, uint32_t uses) { tracer_.load(scene.view(), uses); }
+  VulkanRayTracer(const lsp_scene& scene, uint32_t uses) { tracer_.load(scene, uses); }
 
   double trace(const lsp_trace_options& options, std::span<const LspRay> rays,
                std::span<LspHit> hits) override {
@@ -65,7 +62,11 @@ std::unique_ptr<RayTracer> make_cpu_tracer(const RenderScene& scene, int threads
 }
 
 std::unique_ptr<RayTracer> make_vulkan_tracer(const RenderScene& scene, uint32_t uses) {
-  return std::make_unique<VulkanRayTracer>(scene, uses);
+  if (scene.single() == nullptr) {
+    throw Failure(Exit::kUnsupported, scene.path(),
+                  "instances are traced on the CPU alone; use --backend cpu");
+  }
+  return std::make_unique<VulkanRayTracer>(*scene.single(), uses);
 }
 
 }  // namespace lsp::sample

@@ -3,14 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lsp/instanced_scene.hpp"
 #include "lsp/program.h"
 
 namespace lsp::sample {
 namespace {
-
-[[noreturn]] void fail(const lsp_error& error, const std::string& file) {
-  throw Failure(static_cast<Exit>(error.status), file, error.message);
-}
 
 float luminance(glm::vec3 color) { return glm::dot(color, glm::vec3(0.2126f, 0.7152f, 0.0722f)); }
 
@@ -21,85 +18,129 @@ float share_there(const LspTriangle& triangle) {
 
 }  // namespace
 
-RenderScene::RenderScene(const std::filesystem::path& path) {
-  const std::string file = path.string();
-  lsp_error error{};
-  if (lsp_map_file(file.c_str(), &mapping_, &error) != LSP_OK) fail(error, file);
-  try {
-    lsp_status status = lsp_open(mapping_.bytes, mapping_.size, &scene_, &error);
-    if (status == LSP_ERROR_UNSUPPORTED) {
-      // Perhaps a packed file: try to unpack it, and report the first error if that does not help.
-      uint64_t bytes = 0;
-      lsp_error ignored{};
-      if (lsp_unpacked_size(mapping_.bytes, mapping_.size, &bytes, &ignored) == LSP_OK &&
-          bytes > mapping_.size / 2) {
-        unpacked_.resize((bytes + sizeof(LspHeader) - 1) / sizeof(LspHeader));
-        status = lsp_unpack(mapping_.bytes, mapping_.size, unpacked_.data(), bytes, &error);
-        if (status == LSP_OK) status = lsp_open(unpacked_.data(), bytes, &scene_, &error);
-      }
-    }
-    if (status != LSP_OK) fail(error, file);
-    if ((scene_.header->required_features & LSP_FEATURE_EXACT) == 0) {
-      throw Failure(Exit::kUnsupported, file,
-                    "has no exact tree, which primary rays need; bake it without --no-exact");
-    }
-    index_primitives(file);
-    find_emitters();
-  } catch (...) {
-    lsp_unmap_file(&mapping_);
-    throw;
+RenderScene::RenderScene(const std::filesystem::path& path) : path_(path.string()) {
+  if (is_instanced_scene(path_)) {
+    instanced_ = std::make_unique<InstancedScene>(path_);
+    for (size_t i = 0; i < instanced_->assets().size(); ++i)
+      add_asset(*instanced_->assets()[i], instanced_->asset_paths()[i]);
+  } else {
+    file_.emplace(path_);
+    add_asset(*file_, path_);
   }
+  find_emitters();
 }
 
-RenderScene::~RenderScene() { lsp_unmap_file(&mapping_); }
+RenderScene::~RenderScene() = default;
 
-glm::vec3 RenderScene::lo() const { return to_glm(scene_.header->bounds_min); }
-glm::vec3 RenderScene::hi() const { return to_glm(scene_.header->bounds_max); }
-void RenderScene::index_primitives(const std::string& file) {
-  const LspHeader& header = *scene_.header;
+void RenderScene::add_asset(const SceneFile& file, const std::string& path) {
+  if ((file.header().required_features & LSP_FEATURE_EXACT) == 0) {
+    throw Failure(Exit::kUnsupported, path,
+                  "has no exact tree, which primary rays need; bake it without --no-exact");
+  }
+  headers_.push_back(&file.header());
+  Asset& asset = assets_.emplace_back();
+  asset.scene = &file.scene();
+  index_primitives(asset, path);
+  find_materials(asset, path == path_ ? "" : path + ": ");
+}
+
+glm::vec3 RenderScene::lo() const {
+  if (instanced_ == nullptr) return to_glm(file_->header().bounds_min);
+  if (instance_count() == 0) return glm::vec3(0.0f);
+  const float* lo = instanced_->instances().view().nodes[0].lo;
+  return {lo[0], lo[1], lo[2]};
+}
+
+glm::vec3 RenderScene::hi() const {
+  if (instanced_ == nullptr) return to_glm(file_->header().bounds_max);
+  if (instance_count() == 0) return glm::vec3(0.0f);
+  const float* hi = instanced_->instances().view().nodes[0].hi;
+  return {hi[0], hi[1], hi[2]};
+}
+
+void RenderScene::trace(const lsp_trace_options& options, std::span<const LspRay> rays,
+                        std::span<LspHit> hits, lsp_trace_counts* counts) const {
+  if (instanced_ != nullptr) return instanced_->instances().trace(options, 0xFF, rays, hits, counts);
+  lsp_error error{};
+  if (lsp_trace(single(), &options, rays.data(), hits.data(), rays.size(), counts, &error) != LSP_OK)
+    throw Failure(static_cast<Exit>(error.status), "", error.message);
+}
+
+void RenderScene::index_primitives(Asset& asset, const std::string& file) const {
+  const lsp_scene& scene = *asset.scene;
+  const LspHeader& header = *scene.header;
   // The table has an entry per primitive: a header that declares far more of them than there are triangles
   // would only ask for memory.
   if (header.primitive_count > 64ull * header.triangle_count + (1ull << 24)) {
     throw Failure(Exit::kLimit, file,
                   "declares far more primitives than it has triangles; run lsp-validate on it");
   }
-  triangle_of_primitive_.assign(header.primitive_count, LSP_NONE);
+  asset.triangle_of_primitive.assign(header.primitive_count, LSP_NONE);
   for (uint32_t i = 0; i < header.triangle_count; ++i) {
-    const uint32_t primitive = scene_.triangles[i].primitive;
+    const uint32_t primitive = scene.triangles[i].primitive;
     if (primitive >= header.primitive_count) {
       throw Failure(Exit::kInvalid, file, "a triangle's primitive is out of range; run lsp-validate on it");
     }
     // Spatial splits repeat a primitive; its records are the same.
-    triangle_of_primitive_[primitive] = i;
+    asset.triangle_of_primitive[primitive] = i;
   }
-  if (scene_.materials != nullptr && header.material_count > 0) {
-    materials_.assign(scene_.materials, scene_.materials + header.material_count);
+}
+
+void RenderScene::find_materials(Asset& asset, const std::string& note_prefix) {
+  const lsp_scene& scene = *asset.scene;
+  if (scene.materials != nullptr && scene.header->material_count > 0) {
+    asset.materials.assign(scene.materials, scene.materials + scene.header->material_count);
   } else {
     LspMaterial grey{};
     grey.base_color = {0.7f, 0.7f, 0.7f};
     grey.opacity = 1.0f;
     grey.roughness = 0.6f;
-    materials_.push_back(grey);
-    notes_.emplace_back("no materials in the file: everything is grey");
+    asset.materials.push_back(grey);
+    notes_.push_back(note_prefix + "no materials in the file: everything is grey");
   }
-  if (scene_.normals == nullptr) notes_.emplace_back("no corner normals in the file: surfaces are faceted");
+  if (scene.normals == nullptr)
+    notes_.push_back(note_prefix + "no corner normals in the file: surfaces are faceted");
+}
+
+uint32_t RenderScene::instance_count() const {
+  return instanced_ == nullptr ? 1 : instanced_->instances().size();
+}
+
+const RenderScene::Asset& RenderScene::asset_of(uint32_t instance) const {
+  return instanced_ == nullptr ? assets_.front() : assets_[instanced_->instances()[instance].asset];
+}
+
+RenderScene::Corners RenderScene::corners(uint32_t instance, const LspTriangle& triangle) const {
+  const glm::vec3 v0 = to_glm(triangle.v0);
+  const glm::vec3 e1 = to_glm(triangle.v1) - v0;
+  const glm::vec3 e2 = to_glm(triangle.v2) - v0;
+  if (instanced_ == nullptr) return {v0, e1, e2};
+  const lsp_instance_record& record = instanced_->instances().view().records[instance];
+  const float* t = record.instance.transform;
+  const glm::dmat3 linear(t[0], t[4], t[8], t[1], t[5], t[9], t[2], t[6], t[10]);
+  const glm::dvec3 translation(record.translation[0], record.translation[1], record.translation[2]);
+  return {linear * glm::dvec3(v0) + translation, linear * glm::dvec3(e1), linear * glm::dvec3(e2)};
 }
 
 void RenderScene::find_emitters() {
   double total = 0;
   std::vector<double> powers;
-  for (uint32_t i = 0; i < scene_.header->triangle_count; ++i) {
-    const LspTriangle& triangle = scene_.triangles[i];
-    if (triangle_of_primitive_[triangle.primitive] != i || triangle.material >= materials_.size()) continue;
-    const float brightness =
-        share_there(triangle) * luminance(to_glm(materials_[triangle.material].emission));
-    if (!(brightness > 0) || !std::isfinite(brightness)) continue;
-    const glm::vec3 v0 = to_glm(triangle.v0);
-    const float area = 0.5f * glm::length(glm::cross(to_glm(triangle.v1) - v0, to_glm(triangle.v2) - v0));
-    if (!(area > 0)) continue;
-    total += static_cast<double>(area) * static_cast<double>(brightness);
-    powers.push_back(total);
-    emitters_.push_back({i, 0.0f, brightness});
+  for (uint32_t instance = 0; instance < instance_count(); ++instance) {
+    const Asset& asset = asset_of(instance);
+    for (uint32_t i = 0; i < asset.scene->header->triangle_count; ++i) {
+      const LspTriangle& triangle = asset.scene->triangles[i];
+      if (asset.triangle_of_primitive[triangle.primitive] != i || triangle.material >= asset.materials.size())
+        continue;
+      const float brightness =
+          share_there(triangle) * luminance(to_glm(asset.materials[triangle.material].emission));
+      if (!(brightness > 0) || !std::isfinite(brightness)) continue;
+      const Corners c = corners(instance, triangle);
+      const float area = 0.5f * glm::length(glm::cross(c.e1, c.e2));
+      if (!(area > 0)) continue;
+      total += static_cast<double>(area) * static_cast<double>(brightness);
+      powers.push_back(total);
+      emitters_.push_back({instance, i, 0.0f, brightness});
+    }
   }
   for (size_t i = 0; i < emitters_.size(); ++i) {
     emitters_[i].cumulative = static_cast<float>(powers[i] / total);
@@ -121,45 +162,46 @@ glm::vec3 above(const SurfacePoint& point, glm::vec3 direction) {
 EmitterPoint RenderScene::sample_emitter(float chance, glm::vec2 point) const {
   const auto found = std::lower_bound(emitters_.begin(), emitters_.end() - 1, chance,
                                       [](const Emitter& e, float value) { return e.cumulative <= value; });
-  const LspTriangle& triangle = scene_.triangles[found->triangle];
+  const Asset& asset = asset_of(found->instance);
+  const LspTriangle& triangle = asset.scene->triangles[found->triangle];
   // Uniform over the triangle.
   const float root = std::sqrt(point.x);
   const float u = root * (1.0f - point.y);
   const float v = root * point.y;
-  const glm::vec3 v0 = to_glm(triangle.v0);
-  const glm::vec3 e1 = to_glm(triangle.v1) - v0;
-  const glm::vec3 e2 = to_glm(triangle.v2) - v0;
-  return {v0 + u * e1 + v * e2, glm::normalize(glm::cross(e1, e2)),
-          share_there(triangle) * to_glm(materials_[triangle.material].emission), found->pdf};
+  const Corners c = corners(found->instance, triangle);
+  return {c.v0 + u * c.e1 + v * c.e2, glm::normalize(glm::cross(c.e1, c.e2)),
+          share_there(triangle) * to_glm(asset.materials[triangle.material].emission), found->pdf};
 }
 
 SurfacePoint RenderScene::surface(const LspRay& ray, const LspHit& hit) const {
   const glm::vec3 direction = to_glm(ray.direction);
+  const uint32_t instance = instanced_ == nullptr ? 0 : LSP_HIT_INSTANCE(hit);
+  const Asset& asset = asset_of(instance);
   SurfacePoint point{};
   point.position = to_glm(ray.origin) + hit.t * direction;
-  point.offset = lsp_hit_offset(&scene_, &hit);
+  point.offset = instanced_ == nullptr ? lsp_hit_offset(asset.scene, &hit)
+                                       : lsp_instance_hit_offset(&instanced_->instances().view(), &hit);
   point.shading_normal = to_glm(hit.normal);
   point.geometric_normal = point.shading_normal;
-  const uint32_t index =
-      hit.primitive < triangle_of_primitive_.size() ? triangle_of_primitive_[hit.primitive] : LSP_NONE;
+  const uint32_t index = hit.primitive < asset.triangle_of_primitive.size()
+                             ? asset.triangle_of_primitive[hit.primitive]
+                             : LSP_NONE;
   size_t material = 0;
   if (index != LSP_NONE) {
-    const LspTriangle& triangle = scene_.triangles[index];
-    const glm::vec3 v0 = to_glm(triangle.v0);
-    const glm::vec3 e1 = to_glm(triangle.v1) - v0;
-    const glm::vec3 e2 = to_glm(triangle.v2) - v0;
-    const glm::vec3 cross = glm::cross(e1, e2);
+    const LspTriangle& triangle = asset.scene->triangles[index];
+    const Corners c = corners(instance, triangle);
+    const glm::vec3 cross = glm::cross(c.e1, c.e2);
     const float length = glm::length(cross);
     if (length > 0) point.geometric_normal = cross / length;
     // On a triangle that was hit exactly this is closer to it than origin + t * direction. A Line Space may
     // have moved t into its box, away from the point that the weights name.
-    if ((hit.flags & LSP_HIT_LINE_SPACE) == 0) point.position = v0 + hit.u * e1 + hit.v * e2;
-    material = triangle.material < materials_.size() ? triangle.material : 0;
+    if ((hit.flags & LSP_HIT_LINE_SPACE) == 0) point.position = c.v0 + hit.u * c.e1 + hit.v * c.e2;
+    material = triangle.material < asset.materials.size() ? triangle.material : 0;
   }
   if (glm::dot(point.geometric_normal, direction) > 0) point.geometric_normal = -point.geometric_normal;
   if (glm::dot(point.geometric_normal, point.shading_normal) < 0)
     point.shading_normal = -point.shading_normal;
-  const LspMaterial& m = materials_[material];
+  const LspMaterial& m = asset.materials[material];
   point.base_color = glm::clamp(to_glm(m.base_color), 0.0f, 1.0f);
   point.emission = to_glm(m.emission);
   point.roughness = glm::clamp(m.roughness, 0.0f, 1.0f);

@@ -1,12 +1,21 @@
-// An open .lsp file with what shading needs beside it: triangles by primitive, materials, emitters, a sky.
+// An open .lsp file, or a scene of instances of several, with what shading needs beside it: triangles by
+// primitive, materials, emitters, a sky.
 #pragma once
 
 #include <filesystem>
 #include <glm/glm.hpp>
+#include <memory>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
-#include "lsp/lsp.h"
+#include "lsp/lsp_instances.h"
+#include "lsp/scene_file.hpp"
+
+namespace lsp {
+class InstancedScene;
+}
 
 namespace lsp::sample {
 
@@ -30,22 +39,32 @@ struct EmitterPoint {
   float pdf = 0.0f;  // per area
 };
 
-// Owns the mapping of the file.
+// Owns the files.
 class RenderScene {
  public:
-  // Maps and opens `path`; a packed file is unpacked into memory. Throws lsp::Failure: kFile, kInvalid, or
-  // kUnsupported for a file without an exact tree, which primary rays need.
+  // Maps and opens `path`, an .lsp file or, by its ending .json, a scene of instances; packed files are
+  // unpacked into memory. Throws lsp::Failure: kFile, kInvalid, or kUnsupported for a file without an exact
+  // tree, which primary rays need.
   explicit RenderScene(const std::filesystem::path& path);
   ~RenderScene();
   RenderScene(const RenderScene&) = delete;
   RenderScene& operator=(const RenderScene&) = delete;
 
-  const lsp_scene& view() const { return scene_; }
+  const std::string& path() const { return path_; }
+  // The one file's scene; nullptr: there are instances.
+  const lsp_scene* single() const { return file_ ? &file_->scene() : nullptr; }
+  // Of every file.
+  const std::vector<const LspHeader*>& headers() const { return headers_; }
   glm::vec3 lo() const;
   glm::vec3 hi() const;
   float diagonal() const { return glm::length(hi() - lo()); }
   // What the file does not have and what stands in for it; empty if nothing is missing.
   const std::vector<std::string>& notes() const { return notes_; }
+
+  // Traces rays into hits, of the same size, on the CPU, in this thread; adds to *counts unless it is null.
+  // Throws lsp::Failure.
+  void trace(const lsp_trace_options& options, std::span<const LspRay> rays, std::span<LspHit> hits,
+             lsp_trace_counts* counts) const;
 
   // The point that `ray` hits; `hit` must be a hit of this scene.
   SurfacePoint surface(const LspRay& ray, const LspHit& hit) const;
@@ -55,19 +74,37 @@ class RenderScene {
   EmitterPoint sample_emitter(float chance, glm::vec2 point) const;
 
  private:
+  // What shading needs of a file.
+  struct Asset {
+    const lsp_scene* scene;
+    std::vector<uint32_t> triangle_of_primitive;
+    std::vector<LspMaterial> materials;
+  };
+  // A triangle in scene space.
+  struct Corners {
+    glm::vec3 v0;
+    glm::vec3 e1;
+    glm::vec3 e2;
+  };
   struct Emitter {
+    uint32_t instance;  // 0 where there are none
     uint32_t triangle;
     float cumulative;  // of area times luminance, up to and with this one, over the total
     float pdf;         // per area
   };
-  void index_primitives(const std::string& file);
+  void add_asset(const SceneFile& file, const std::string& path);
+  void index_primitives(Asset& asset, const std::string& file) const;
+  void find_materials(Asset& asset, const std::string& note_prefix);
   void find_emitters();
+  uint32_t instance_count() const;
+  const Asset& asset_of(uint32_t instance) const;
+  Corners corners(uint32_t instance, const LspTriangle& triangle) const;
 
-  lsp_mapping mapping_{};
-  std::vector<LspHeader> unpacked_;  // 256-byte blocks, so that the bytes are aligned
-  lsp_scene scene_{};
-  std::vector<uint32_t> triangle_of_primitive_;
-  std::vector<LspMaterial> materials_;
+  std::string path_;
+  std::optional<SceneFile> file_;
+  std::unique_ptr<InstancedScene> instanced_;
+  std::vector<Asset> assets_;
+  std::vector<const LspHeader*> headers_;
   std::vector<Emitter> emitters_;
   std::vector<std::string> notes_;
 };

@@ -8,7 +8,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "lsp/lsp.h"
+#include "lsp/instances.hpp"
 #include "scene_builder.h"
 
 namespace lsp::test {
@@ -173,6 +173,95 @@ TEST_F(LspTrace, FailureLeavesOldHits) {
   for (const auto& entry : fs::directory_iterator(folder_)) {
     EXPECT_EQ(entry.path().string().find(".tmp"), std::string::npos) << entry.path();
   }
+}
+
+TEST_F(LspTrace, InstancesOfSeveralFiles) {
+  const std::string scene =
+      R"({"lsp_scene": 1, "name": "three", "assets": ["raw.lsp", "packed.lsp"], "instances": [
+          {"asset": 0, "transform": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]},
+          {"asset": 1, "transform": [0, -1, 0, 3, 2, 0, 0, 0, 0, 0, 1, 0], "mask": 4, "user": 7, "name": "turned"},
+          {"asset": 0, "transform": [-1, 0, 0, 0, 0, 1, 0, 3, 0, 0, 1, 0], "mask": 0}]})";
+  write("scene.json", scene.data(), scene.size());
+  lsp_scene asset;
+  ASSERT_EQ(lsp_open(raw_.data(), raw_.size(), &asset, nullptr), LSP_OK);
+  const lsp_instance places[] = {{0, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}, 255, 0},
+                                 {1, {0, -1, 0, 3, 2, 0, 0, 0, 0, 0, 1, 0}, 4, 7},
+                                 {0, {-1, 0, 0, 0, 0, 1, 0, 3, 0, 0, 1, 0}, 0, 0}};
+  const Instances instances({&asset, &asset}, places);
+  std::vector<LspHit> hits(rays_.size());
+  for (const uint32_t flags : {0u, LSP_TRACE_APPROXIMATE}) {
+    lsp_trace_counts counts{};
+    instances.trace({flags, 0}, 255, rays_, hits, &counts);
+    ASSERT_EQ(run(std::string("scene.json --json") + kFiles + (flags == 0 ? "--mode exact" : "")), 0)
+        << err();
+    expect_hits(hits);
+    const nlohmann::json json = nlohmann::json::parse(out());
+    EXPECT_EQ(json["instances"], 3);
+    EXPECT_EQ(json["assets"], 2);
+    EXPECT_EQ(json["mode"], flags == 0 ? "exact" : "approximate");
+    EXPECT_EQ(json["hits"], counts.hits);
+    EXPECT_EQ(json["invalid"], 2);
+    EXPECT_EQ(json["bytes_mapped"], raw_.size());
+  }
+  bool seen[3] = {};
+  for (const LspHit& hit : hits)
+    if (hit.primitive != LSP_NONE) seen[hit.flags >> 8] = true;
+  EXPECT_TRUE(seen[0] && seen[1] && !seen[2]);
+  EXPECT_EQ(run(std::string("scene.json --backend vulkan") + kFiles), 5);
+  EXPECT_EQ(err().rfind("lsp-trace: scene.json: ", 0), 0u) << err();
+  const std::string empty = R"({"lsp_scene": 1, "assets": [], "instances": []})";
+  write("empty.json", empty.data(), empty.size());
+  EXPECT_EQ(run(std::string("empty.json") + kFiles), 0) << err();
+}
+
+TEST_F(LspTrace, FaultsOfASceneAreNamedByPlace) {
+  const std::string good = R"({"asset": 0, "transform": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]})";
+  const auto scene = [&](const std::string& instance, const std::string& asset = "\"raw.lsp\"") {
+    return R"({"lsp_scene": 1, "assets": [)" + asset + R"(], "instances": [)" + good + ", " + instance + "]}";
+  };
+  const struct {
+    std::string text;
+    int exit;
+    std::string place;
+  } cases[] = {
+      {"{\"lsp_scene\": 1,", 3, "is not JSON, byte "},
+      {"[]", 3, "is no JSON object"},
+      {"{}", 3, "/lsp_scene: is missing"},
+      {R"({"lsp_scene": "1"})", 3, "/lsp_scene: "},
+      {R"({"lsp_scene": 2})", 5, "/lsp_scene: is 2"},
+      {R"({"lsp_scene": 1, "assets": {}})", 3, "/assets: "},
+      {R"({"lsp_scene": 1, "assets": []})", 3, "/instances: is missing"},
+      {R"({"lsp_scene": 1, "asets": []})", 3, "/asets: is not known"},
+      {scene(good, "5"), 3, "/assets/0: "},
+      {scene(good, "\"gone.lsp\""), 2, "/assets/0: gone.lsp: "},
+      {scene(good, "\"rays.bin\""), 3, "/assets/0: rays.bin: "},
+      {scene("7"), 3, "/instances/1: "},
+      {scene(R"({"transform": []})"), 3, "/instances/1/asset: is missing"},
+      {scene(R"({"asset": 1, "transform": []})"), 3, "/instances/1/asset: is 1"},
+      {scene(R"({"asset": -1, "transform": []})"), 3, "/instances/1/asset: "},
+      {scene(R"({"asset": 0})"), 3, "/instances/1/transform: is missing"},
+      {scene(R"({"asset": 0, "transform": [1, 2, 3]})"), 3, "/instances/1/transform: "},
+      {scene(R"({"asset": 0, "transform": [1, 0, 0, 0, 0, "1", 0, 0, 0, 0, 1, 0]})"), 3,
+       "/instances/1/transform/5: "},
+      {scene(R"({"asset": 0, "transform": [1, 0, 0, 1e39, 0, 1, 0, 0, 0, 0, 1, 0]})"), 3,
+       "/instances/1/transform/3: "},
+      {scene(R"({"asset": 0, "transform": [1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0]})"), 3,
+       "/instances/1/transform: has no inverse"},
+      {scene(R"({"asset": 0, "transform": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0], "mask": 256})"), 3,
+       "/instances/1/mask: "},
+      {scene(R"({"asset": 0, "transform": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0], "user": 1.5})"), 3,
+       "/instances/1/user: "},
+      {scene(R"({"asset": 0, "transform": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0], "maks": 1})"), 3,
+       "/instances/1/maks: is not known"},
+  };
+  for (const auto& c : cases) {
+    SCOPED_TRACE(c.text);
+    write("bad.json", c.text.data(), c.text.size());
+    EXPECT_EQ(run(std::string("bad.json") + kFiles), c.exit);
+    EXPECT_EQ(err().rfind("lsp-trace: bad.json: " + c.place, 0), 0u) << err();
+  }
+  EXPECT_EQ(run(std::string("none.json") + kFiles), 2);
+  EXPECT_FALSE(fs::exists(folder_ / "hits.bin"));
 }
 
 TEST_F(LspTrace, VulkanGivesTheSameFile) {

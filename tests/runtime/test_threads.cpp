@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-#include "lsp/lsp.h"
+#include "lsp/lsp_instances.h"
 
 namespace {
 
@@ -88,6 +88,45 @@ TEST(Threads, OneSceneIsTracedByAllAndOpenedMeanwhile) {
     for (size_t me = 0; me < kThreads; ++me) EXPECT_TRUE(same[me]) << "thread " << me;
   }
   EXPECT_GT(scenes, 10u);
+}
+
+TEST(Threads, InstancesAreTracedByAllAndBuiltMeanwhile) {
+  const File file(LSP_CORPUS_DIR "/full.lsp");
+  ASSERT_EQ(file.status, LSP_OK);
+  const lsp_scene* const assets[] = {&file.scene};
+  std::vector<lsp_instance> places;
+  for (uint32_t i = 0; i < 20; ++i)
+    places.push_back({0, {1, 0, 0, 0.3f * float(i), 0, 1, 0, 0, 0, 0, -1, 0}, 255, i});
+  const auto build = [&](std::vector<uint64_t>& memory) {
+    memory.resize(2 * (lsp_instances_bytes(20) / 16 + 1));  // at a multiple of 16, as all that is allocated
+    lsp_instances instances;
+    EXPECT_EQ(lsp_instances_build(assets, 1, places.data(), 20, memory.data(),
+                                  memory.size() * sizeof(uint64_t), &instances, nullptr),
+              LSP_OK);
+    return instances;
+  };
+  const std::vector<LspRay> rays = rays_about(*file.scene.header);
+  const auto trace_all = [&](const lsp_instances& instances) {
+    std::vector<LspHit> hits(rays.size());
+    const lsp_trace_options options{};
+    lsp_trace_instances(&instances, &options, 255, rays.data(), hits.data(), rays.size(), nullptr, nullptr);
+    return hits;
+  };
+  std::vector<uint64_t> memory;
+  const lsp_instances shared = build(memory);
+  const std::vector<LspHit> alone = trace_all(shared);
+  bool same[kThreads] = {};
+  {
+    std::vector<std::jthread> threads;
+    for (size_t me = 0; me < kThreads; ++me) {
+      threads.emplace_back([&, me] {
+        std::vector<uint64_t> own;
+        const auto hits = trace_all(me % 2 ? build(own) : shared);
+        same[me] = std::memcmp(hits.data(), alone.data(), hits.size() * sizeof(LspHit)) == 0;
+      });
+    }
+  }
+  for (size_t me = 0; me < kThreads; ++me) EXPECT_TRUE(same[me]) << "thread " << me;
 }
 
 }  // namespace

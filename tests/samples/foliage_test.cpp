@@ -135,7 +135,7 @@ TEST_F(Grove, AsMuchLightPassesAsThroughTheTexels) {
       lsp_trace_options options{};
       options.flags = LSP_TRACE_ANY_HIT | mode;
       lsp_error error{};
-      ASSERT_EQ(lsp_trace(&baked.view(), &options, rays.data(), hits.data(), rays.size(), nullptr, &error),
+      ASSERT_EQ(lsp_trace(baked.single(), &options, rays.data(), hits.data(), rays.size(), nullptr, &error),
                 LSP_OK)
           << error.message;
       size_t passed = 0, truly = 0, differ = 0;

@@ -96,6 +96,41 @@ TEST_F(Programs, ApproximateIsCloseAndPrimaryRaysAreExact) {
   EXPECT_NEAR(all.mean_test / all.mean_reference, 1.0, 0.02);
 }
 
+// A scene of one instance that is not moved is the file; of two places the picture shows both.
+TEST_F(Programs, InstancesAreRendered) {
+  const auto write = [](const std::string& name, const std::string& transforms) {
+    std::ofstream(file(name)) << R"({"lsp_scene": 1, "assets": ["spheres.lsp"], "instances": [)" << transforms
+                              << "]}";
+  };
+  const std::string here = R"({"asset": 0, "transform": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]})";
+  const std::string beside = R"({"asset": 0, "transform": [-0.5, 0, 0, 2, 0, 0.5, 0, 1, 0, 0, 0.5, 2]})";
+  write("one.json", here);
+  write("two.json", here + ", " + beside);
+  write("hidden.json", here + ", " + beside.substr(0, beside.size() - 1) + R"(, "mask": 0})");
+  const auto picture = [](const std::string& scene, const std::string& options) {
+    EXPECT_EQ(run("lsp-render " + file(scene) + " -o " + file("p.pfm") +
+                  " --quiet --size 64x36 --samples 8 --camera 4,3,6:0,0.5,0:45 " + options),
+              0);
+    return read_pfm(file("p.pfm"));
+  };
+  for (const std::string options : {"--effect direct", "--effect all", "--effect all --mode approximate",
+                                    "--effect glossy --mode approximate", "--effect diffuse --bounces 2"}) {
+    SCOPED_TRACE(options);
+    const Picture alone = picture("spheres.lsp", options);
+    EXPECT_GT(compare(alone, picture("one.json", options)).psnr_db, 35.0);
+    EXPECT_LT(compare(alone, picture("two.json", options)).psnr_db, 35.0);
+  }
+  EXPECT_GT(
+      compare(picture("one.json", "--effect direct"), picture("hidden.json", "--effect direct")).psnr_db,
+      35.0);
+  picture("two.json", "--effect ao");
+  picture("two.json", "--heat steps --mode approximate");
+  EXPECT_EQ(run("lsp-render " + file("one.json") + " -o " + file("p.pfm") + " --quiet --backend vulkan"), 5);
+  write("bad.json", "{}");
+  EXPECT_EQ(run("lsp-render " + file("bad.json") + " -o " + file("p.pfm") + " --quiet"), 3);
+  EXPECT_EQ(run("lsp-render " + file("none.json") + " -o " + file("p.pfm") + " --quiet"), 2);
+}
+
 // Rays that go on from a table's plane begin in front of the surface (lsp_hit_offset): from behind it they
 // would find themselves in its shadow, and the light of the next bounce was 5 % darker.
 TEST_F(Programs, BouncesFromTablesAreNoDarker) {

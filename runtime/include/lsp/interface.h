@@ -19,8 +19,10 @@ LSP_BEGIN(LspHit)
   LSP_FLOAT u;        /* weight of corner 1; outside [0, 1] where a plane was extrapolated */
   LSP_FLOAT v;        /* weight of corner 2 */
   LSP_VEC3 normal;    /* unit shading normal; it may face away from the ray */
-  LSP_UINT flags;     /* LSP_HIT_* */
+  LSP_UINT flags;     /* LSP_HIT_* in bits 0 to 7; from bit 8 on the instance's number, where there are instances */
 LSP_END(LspHit)
+
+#define LSP_HIT_INSTANCE_SHIFT 8u
 
 #define LSP_HIT_LINE_SPACE 0x1u    /* answered by a Line Space */
 #define LSP_HIT_ORIGIN_INSIDE 0x2u /* the origin lies inside that Line Space's node */
@@ -28,7 +30,7 @@ LSP_END(LspHit)
 /* The traversal ended with work left, the answer is not to be trusted. In the library this only happens to
  * files whose declared bounds are wrong; on a device also where it cuts long loops short (some give a
  * vector of invocations a budget of iterations). */
-#define LSP_HIT_INCOMPLETE 0x80000000u
+#define LSP_HIT_INCOMPLETE 0x80u
 
 /* lsp_hit_offset: how far off a hit a ray that goes on from there begins. The plane of a table passes near the surface,
  * not in it: from behind the surface every ray would meet it, and a second bounce be too dark. Of the scene's diagonal,

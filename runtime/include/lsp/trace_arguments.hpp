@@ -2,6 +2,7 @@
 // installed.
 #pragma once
 
+#include <algorithm>
 #include <CLI/CLI.hpp>
 #include <string>
 #include <vector>
@@ -75,6 +76,18 @@ inline std::vector<std::string> unused_arguments(const TraceArguments& a, bool a
   note(a.lod > 0, "--lod", false);
   note(!a.quality.empty(), "--quality", true);
   note(a.max_loss >= 0, "--max-loss", true);
+  return notes;
+}
+
+// The same of several files: what has no meaning for any of them.
+inline std::vector<std::string> unused_arguments(const TraceArguments& a, bool approximate,
+                                                 const std::vector<const LspHeader*>& headers) {
+  std::vector<std::string> notes;
+  for (const LspHeader* header : headers) {
+    const std::vector<std::string> here = unused_arguments(a, approximate, *header);
+    if (header == headers.front()) notes = here;
+    std::erase_if(notes, [&](const auto& n) { return std::find(here.begin(), here.end(), n) == here.end(); });
+  }
   return notes;
 }
 

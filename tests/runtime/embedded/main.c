@@ -1,8 +1,8 @@
-/* Opens the file named and traces a ray. */
+/* Opens the file named and traces a ray, and another at an instance of it. */
 #include <math.h>
 #include <stdio.h>
 
-#include "lsp/lsp.h"
+#include "lsp/lsp_instances.h"
 
 int main(int argc, char** argv) {
   lsp_error error;
@@ -17,6 +17,14 @@ int main(int argc, char** argv) {
   LspHit hit;
   lsp_trace_counts counts = {0};
   if (lsp_trace(&scene, &options, &ray, &hit, 1, &counts, &error) != LSP_OK || counts.rays != 1) return 3;
+  const lsp_scene* const assets[] = {&scene};
+  const lsp_instance place = {.transform = {2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0}, .mask = 1};
+  static _Alignas(16) unsigned char memory[512];
+  lsp_instances instances;
+  if (lsp_instances_build(assets, 1, &place, 1, memory, sizeof memory, &instances, &error) != LSP_OK)
+    return 4;
+  if (lsp_trace_instances(&instances, &options, 1, &ray, &hit, 1, &counts, &error) != LSP_OK) return 5;
+  if (counts.rays != 2 || LSP_HIT_INSTANCE(hit) != 0) return 6;
   lsp_unmap_file(&mapping);
   puts("embedded ok");
   return 0;

@@ -2,12 +2,15 @@
 #include <cstdio>
 #include <cstring>
 
+#include "lsp/instances.hpp"
 #include "lsp/scene_file.hpp"
 
 int main(int argc, char** argv) {
   if (argc != 4) return 1;
   const lsp::SceneFile raw(argv[1]);
   if (raw.unpacked()) return 2;
+  const lsp_instance place = {0, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}, 255, 0};
+  if (lsp::Instances({&raw.scene()}, {&place, 1}).size() != 1) return 6;
   const bool can_unpack = std::strcmp(argv[3], "yes") == 0;
   try {
     const lsp::SceneFile packed(argv[2]);

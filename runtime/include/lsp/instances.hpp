@@ -1,0 +1,85 @@
+// Instances that own their memory: the thin C++ side of lsp_instances.h. Header-only.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <iterator>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "lsp/lsp_instances.h"
+#include "lsp/program.h"
+
+namespace lsp {
+
+// Elements side by side, of a vector, an array, a span or a pointer: not owned. C++17 has no std::span.
+template <class T>
+class View {
+ public:
+  View(T* data, size_t size) : data_(data), size_(size) {}
+  template <class Range>
+  View(Range&& range) : data_(std::data(range)), size_(std::size(range)) {}
+  T* data() const { return data_; }
+  size_t size() const { return size_; }
+
+ private:
+  T* data_;
+  size_t size_;
+};
+
+// Built from scenes and places, and again as places change; memory is kept from one time to the next. Errors
+// are thrown as lsp::Failure. Tracing is const and may be done from any number of threads, but not while
+// build runs.
+class Instances {
+ public:
+  // No instances: every ray misses.
+  Instances() = default;
+  Instances(std::vector<const lsp_scene*> assets, View<const lsp_instance> instances)
+      : assets_(std::move(assets)) {
+    build(instances);
+  }
+  Instances(const Instances&) = delete;  // the view would be of the other's memory
+  Instances& operator=(const Instances&) = delete;
+  Instances(Instances&&) = default;  // what is left may be destroyed or assigned to
+  Instances& operator=(Instances&&) = default;
+
+  // The scenes named by lsp_instance.asset; they must outlive this.
+  const std::vector<const lsp_scene*>& assets() const { return assets_; }
+
+  // Puts the instances, all of them, at other places. After a failure there are none.
+  void build(View<const lsp_instance> instances) {
+    if (instances.size() > LSP_MAX_INSTANCES)
+      throw Failure(Exit::kLimit, "", std::to_string(instances.size()) + " instances are too many");
+    const auto count = static_cast<uint32_t>(instances.size());
+    memory_.resize(lsp_instances_bytes(count) / sizeof(Block) + 1);
+    lsp_error error;
+    const lsp_status status =
+        lsp_instances_build(assets_.data(), static_cast<uint32_t>(assets_.size()), instances.data(), count,
+                            memory_.data(), memory_.size() * sizeof(Block), &view_, &error);
+    if (status != LSP_OK) throw Failure(static_cast<Exit>(status), "", error.message);
+  }
+
+  // `rays` and `hits` are of one size. Adds to *counts unless it is null.
+  void trace(const lsp_trace_options& options, uint32_t mask, View<const LspRay> rays, View<LspHit> hits,
+             lsp_trace_counts* counts = nullptr) const {
+    lsp_error error;
+    const lsp_status status =
+        lsp_trace_instances(&view_, &options, mask, rays.data(), hits.data(), rays.size(), counts, &error);
+    if (status != LSP_OK) throw Failure(static_cast<Exit>(status), "", error.message);
+  }
+
+  const lsp_instances& view() const { return view_; }
+  const lsp_instance& operator[](uint32_t number) const { return view_.records[number].instance; }
+  uint32_t size() const { return view_.count; }
+
+ private:
+  struct alignas(16) Block {
+    unsigned char bytes[16];
+  };
+  std::vector<const lsp_scene*> assets_;
+  std::vector<Block> memory_;
+  lsp_instances view_{};
+};
+
+}  // namespace lsp
