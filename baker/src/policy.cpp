@@ -173,7 +173,7 @@ uint64_t table_bytes(const Baked& baked) {
   const SectionArrays arrays{baked};
   uint64_t bytes = 0;
 #define LSP_ARRAY_SECTION(Name, TYPE, code, Element, flag, base, feature, owed, member, ...) \
-  if (base == LSP_BASE_CELLS) bytes += uint64_t{arrays.member.size()} * sizeof(Element);
+  if ((feature) == LSP_FEATURE_CELLS) bytes += uint64_t{arrays.member.size()} * sizeof(Element);
 #include "lsp/sections.def"
   return bytes;
 }

@@ -11,6 +11,9 @@
 namespace lsp {
 namespace {
 
+// Of the tree for exact rays: wide ones, or those of a BVH or NTree.
+uint32_t nodes_of(const LspHeader& header) { return header.node_count + header.wide_node_count; }
+
 using Json = nlohmann::ordered_json;
 
 // The most memory this process has held; 0 where the system does not tell. getrusage would count what the
@@ -56,7 +59,7 @@ Json report_json(const BakeReport& done, const Json& meta) {
           {"notes", done.mesh.notes},
           {"skipped", baked.skipped},
           {"error", meta["error"]},
-          {"nodes", baked.header.node_count},
+          {"nodes", nodes_of(baked.header)},
           {"triangle_records", baked.header.triangle_count},
           {"partial_records", partial_records(baked)},
           {"depth", baked.header.max_depth},
@@ -93,7 +96,7 @@ void print_report(const BakeReport& done) {
   for (const std::string& note : mesh.notes) std::printf("note        %s\n", note.c_str());
   if (const uint64_t partial = partial_records(baked))
     std::printf("partial     %" PRIu64 " triangle records are there in part\n", partial);
-  std::printf("tree        %u nodes, %u triangle records, depth %u\n", baked.header.node_count,
+  std::printf("tree        %u nodes, %u triangle records, depth %u\n", nodes_of(baked.header),
               baked.header.triangle_count, baked.header.max_depth);
   if (const LspCellGrid& g = baked.header.cells; g.cells_x)
     std::printf("cells       %u x %u x %u, %u filled; %u splits, %u planes\n", g.cells_x, g.cells_y,
