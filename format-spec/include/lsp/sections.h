@@ -59,7 +59,7 @@ constexpr bool is_ntree(const LspHeader& h) { return h.base_structure == LSP_BAS
 constexpr bool has_cells(const LspHeader& h) { return h.base_structure == LSP_BASE_CELLS; }
 
 // Whether a file with this header may have sections of `base`; one of unknown base is read as a BVH. One of
-// cells has a BVH besides.
+// cells written before 2.3 has a BVH besides.
 constexpr bool holds_base(const LspHeader& h, uint32_t base) {
   if (base == LSP_BASE_CELLS) return has_cells(h);
   return base == 0 || base == (is_ntree(h) ? LSP_BASE_NTREE : LSP_BASE_BVH);
