@@ -28,4 +28,12 @@ inline bool has_sse4() { return __builtin_cpu_supports("sse4.2") && __builtin_cp
 #endif
 inline bool has_neon() { return true; }
 
+// The first of a table (simd_loops.inc) that this CPU runs; null: none.
+template <class Loop>
+const Loop* best_here(const Loop* loops) {
+  for (; loops->name != nullptr; ++loops)
+    if (loops->runs_here()) return loops;
+  return nullptr;
+}
+
 }  // namespace lsp

@@ -617,28 +617,15 @@ HWY_AFTER_NAMESPACE();
 namespace lsp {
 
 const WideCells kWideCells[] = {
-#if HWY_TARGETS & HWY_AVX3
-    {"AVX-512", has_avx3, N_AVX3::trace},
-#endif
-#if HWY_TARGETS & HWY_AVX2
-    {"AVX2", has_avx2, N_AVX2::trace},
-#endif
-#if HWY_TARGETS & HWY_SSE4
-    {"SSE4", has_sse4, N_SSE4::trace},
-#endif
-#if HWY_TARGETS & HWY_NEON
-    {"NEON", has_neon, N_NEON::trace},
-#endif
-    {nullptr, nullptr, nullptr}};
+#include "simd_loops.inc"
+};
 
 const WideCells* wide_cells(const lsp_scene& scene) {
   const LspHeader& header = *scene.header;
   // Indices of words are signed in a gather.
   constexpr uint32_t kReach = 1u << 30;
   if (header.entry_word_count >= kReach || header.split_count >= kReach) return nullptr;
-  for (const WideCells* wide = kWideCells; wide->name != nullptr; ++wide)
-    if (wide->runs_here()) return wide;
-  return nullptr;
+  return best_here(kWideCells);
 }
 
 }  // namespace lsp

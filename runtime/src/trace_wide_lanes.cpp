@@ -412,25 +412,10 @@ HWY_AFTER_NAMESPACE();
 namespace lsp {
 
 const WideExact kWideExact[] = {
-#if HWY_TARGETS & HWY_AVX3
-    {"AVX-512", has_avx3, N_AVX3::trace},
-#endif
-#if HWY_TARGETS & HWY_AVX2
-    {"AVX2", has_avx2, N_AVX2::trace},
-#endif
-#if HWY_TARGETS & HWY_SSE4
-    {"SSE4", has_sse4, N_SSE4::trace},
-#endif
-#if HWY_TARGETS & HWY_NEON
-    {"NEON", has_neon, N_NEON::trace},
-#endif
-    {nullptr, nullptr, nullptr}};
+#include "simd_loops.inc"
+};
 
-const WideExact* wide_exact() {
-  for (const WideExact* wide = kWideExact; wide->name != nullptr; ++wide)
-    if (wide->runs_here()) return wide;
-  return nullptr;
-}
+const WideExact* wide_exact() { return best_here(kWideExact); }
 
 }  // namespace lsp
 #endif
