@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "box.h"
 #include "lsp/program.h"
+#include "vectors.h"
 
 namespace lsp {
 namespace {
@@ -68,13 +70,7 @@ class Collapse {
 
   Branch child_of(uint32_t ref, int k) const {
     LspNode& n = bvh_.nodes[ref];
-    const auto box = [](const lsp_float3& lo, const lsp_float3& hi) {
-      Box b;
-      b.lo = {lo.x, lo.y, lo.z};
-      b.hi = {hi.x, hi.y, hi.z};
-      return b;
-    };
-    return k == 0 ? Branch{box(n.lo0, n.hi0), &n.child0} : Branch{box(n.lo1, n.hi1), &n.child1};
+    return k == 0 ? Branch{{vec(n.lo0), vec(n.hi0)}, &n.child0} : Branch{{vec(n.lo1), vec(n.hi1)}, &n.child1};
   }
   bool is_leaf(uint32_t ref) const { return is_leaf_reference(ref) || plans_[ref].leaf; }
   uint32_t triangles_of(uint32_t ref) const {
@@ -220,7 +216,7 @@ class Collapse {
     Box box;
     for (const Branch& b : branches) box.grow(b.box);
     LspWideNode n{};
-    n.lo = {box.lo.x, box.lo.y, box.lo.z};
+    n.lo = f3(box.lo);
     n.step = {step(box, 0), step(box, 1), step(box, 2)};
     n.node_first = static_cast<uint32_t>(tree_.nodes.size());
     n.triangle_first = static_cast<uint32_t>(order_.size());

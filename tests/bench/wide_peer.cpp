@@ -4,12 +4,11 @@
 
 #include "lsp/program.h"
 #include "timing.h"
+#include "vectors.h"
 #include "wide_tree.h"
 
 namespace lsp::bench {
 namespace {
-
-glm::vec3 vec(const lsp_float3& v) { return {v.x, v.y, v.z}; }
 
 class WideTracer : public Tracer {
  public:
