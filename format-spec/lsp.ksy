@@ -44,6 +44,7 @@ enums:
     1: bvh
     2: ntree
     3: cells
+    4: wide
 types:
   vec3:
     seq:

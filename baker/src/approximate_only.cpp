@@ -275,4 +275,16 @@ void keep_tables_only(Baked& baked) {
   set_counts(baked);
 }
 
+void leave_out_tables(Baked& baked, const std::string& reason) {
+  baked.cell_grid = {};
+  baked.cell_tables = {};
+  LspHeader& h = baked.header;
+  h.cells = {};
+  for (uint32_t& dial : h.quality) dial = 0;
+  h.base_structure = LSP_BASE_WIDE;
+  h.required_features = (h.required_features & ~LSP_FEATURE_CELLS) | LSP_FEATURE_WIDE | LSP_FEATURE_WIDE_BASE;
+  set_counts(baked);
+  baked.skipped = {"tables: " + reason};
+}
+
 }  // namespace lsp

@@ -17,7 +17,8 @@ constexpr uint32_t kNTreeLevels = 3;
 struct Arguments {
   std::vector<std::filesystem::path> inputs;
   std::filesystem::path output;
-  std::string base;  // empty: cells, or what the options given belong to
+  std::string base;           // empty: cells, or what the options given belong to
+  bool weigh_tables = false;  // cells, but only as fine as they are worth it
   uint32_t cells = 0;
   uint32_t branching = 0;  // 0: the resolution
   uint32_t levels = kNTreeLevels;
@@ -29,7 +30,7 @@ struct Arguments {
   bool exact = false;
   bool no_line_spaces = false;
   std::string compress = "none";
-  uint32_t align = 4096;
+  uint32_t align = 0;  // 0: chosen by the file's length
   uint32_t threads = 0;
   uint64_t memory_limit = 0;
   float normal_angle = 180;

@@ -155,6 +155,11 @@ lsp_scene view(const Baked& baked) {
   return scene;
 }
 
+uint64_t exact_bytes(const Baked& baked) {
+  return baked.triangles.size() * sizeof(LspTriangle) + baked.normals.size() * sizeof(LspCornerNormals) +
+         baked.materials.size() * sizeof(LspMaterial) + baked.wide.nodes.size() * sizeof(LspWideNode);
+}
+
 void set_counts(Baked& baked) {
   LspHeader& h = baked.header;
   format::set_counters(h, SectionArrays{baked});

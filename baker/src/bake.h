@@ -29,7 +29,7 @@ enum class Purpose {
   kAll,
 };
 
-enum class Base { kBvh, kNTree, kCells };
+enum class Base { kBvh, kNTree, kCells, kWide };
 
 struct BakeOptions {
   Purpose purpose = Purpose::kAll;
@@ -40,12 +40,19 @@ struct BakeOptions {
   LineSpaceOptions line_space;
   uint32_t cells = 0;  // along the longest side of the grid; 0: chosen from the scene
   CellTableOptions cell_tables;
+  double table_share =
+      0;  // about: bytes of tables over bytes of exact data, 0: no limit; see choose_cell_grid
   double cells_wrong = 0.01;  // share of the rays that the quality "balanced" may answer wrongly, see dial.h
   float plane_tolerance = 0.0f;         // LspHeader.plane_tolerance
   float normal_angle_degrees = 180.0f;  // LspHeader.normal_angle_cos; 180: no hit is rejected
   uint64_t memory_limit = 0;            // bytes, 0: none
   std::filesystem::path
       folder;  // where Line Spaces that the limit has no room for go meanwhile; empty: nowhere
+};
+
+// What a ray costs, in steps through the grid: answered by cells at the quality "balanced", and exactly.
+struct RayCost {
+  double cells = 0, exact = 0;
 };
 
 // The sections of a file, and the header but for what the writer knows (sizes, offsets, hashes).
@@ -61,6 +68,7 @@ struct Baked {
   std::vector<LspMaterial> materials;     // empty: no section
   LineSpaces line_spaces;
   std::vector<std::string> skipped;  // what the scene did not need, in words
+  RayCost cost;
   double tree_seconds = 0;
   double line_space_seconds = 0;
 };
@@ -110,6 +118,12 @@ lsp_scene view(const Baked& baked);
 // triangles that are there in part. Throws Failure with Exit::kLimit where the header has no room for what
 // follows.
 void set_counts(Baked& baked);
+
+// Leaves out the tables of cells: wide nodes remain. `reason` is for the report.
+void leave_out_tables(Baked& baked, const std::string& reason);
+
+// Bytes of what exact rays need and hits are shaded by: triangles, normals, materials, nodes.
+uint64_t exact_bytes(const Baked& baked);
 
 // A number for people: 1,234,567.
 std::string with_commas(uint64_t n);

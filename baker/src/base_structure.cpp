@@ -72,8 +72,13 @@ void fill_ntree(BakeJob& job) {
 void build_cells_base(BakeJob& job) {
   Baked& baked = job.baked;
   baked.header.base_structure = LSP_BASE_CELLS;
-  baked.cell_grid = job.options.cells ? build_cell_grid(baked.triangles, job.bounds, job.options.cells)
-                                      : choose_cell_grid(baked.triangles, job.bounds);
+  // What a filled cell takes, on average: 12 kB to 15 kB of objects, 20 kB of rooms.
+  constexpr double kCellBytes = 15000;
+  const double most = job.options.table_share * double(exact_bytes(baked)) / kCellBytes;
+  baked.cell_grid = job.options.cells
+                        ? build_cell_grid(baked.triangles, job.bounds, job.options.cells)
+                        : choose_cell_grid(baked.triangles, job.bounds,
+                                           job.options.table_share > 0 ? size_t(most) : SIZE_MAX);
 }
 
 void fill_cells(BakeJob& job) {
@@ -87,7 +92,11 @@ void fill_cells(BakeJob& job) {
                           with_commas(cells));
 }
 
-void finish_cells(BakeJob& job) { choose_dial(job.baked, job.options.cells_wrong); }
+void finish_cells(BakeJob& job) { job.baked.cost = choose_dial(job.baked, job.options.cells_wrong); }
+
+void build_wide_base(BakeJob& job) { job.baked.header.base_structure = LSP_BASE_WIDE; }
+
+void fill_wide(BakeJob& job) { job.baked.skipped.push_back("tables: not asked for"); }
 
 constexpr BaseStructure kBvh = {0, true, false, bvh_nodes_at, build_bvh_base, fill_bvh, nullptr};
 // It refers to triangles, so that none is repeated; the BVH orders them and fills the Line Spaces.
@@ -95,6 +104,8 @@ constexpr BaseStructure kNTree = {LSP_FEATURE_NTREE, false,      false,  ntree_n
                                   build_ntree_base,  fill_ntree, nullptr};
 constexpr BaseStructure kCells = {LSP_FEATURE_CELLS, true,       true,        bvh_nodes_at,
                                   build_cells_base,  fill_cells, finish_cells};
+constexpr BaseStructure kWide = {
+    LSP_FEATURE_WIDE_BASE | LSP_FEATURE_WIDE, true, true, bvh_nodes_at, build_wide_base, fill_wide, nullptr};
 
 }  // namespace
 
@@ -104,6 +115,8 @@ const BaseStructure& base_structure(Base base) {
       return kNTree;
     case Base::kCells:
       return kCells;
+    case Base::kWide:
+      return kWide;
     case Base::kBvh:
       break;
   }

@@ -114,9 +114,10 @@ int main(int argc, char** argv) {
   app.add_option("-o,--output", a.output, "The .lsp file to write")->required();
   app.add_option(
          "--base", a.base,
-         "Base structure: cells, answered from tables and traced exactly where these lose; or a tree with "
-         "Line Spaces, bvh or ntree. Where it is left out: cells, but bvh with an option of Line Spaces")
-      ->check(CLI::IsMember({"cells", "bvh", "ntree"}));
+         "Base structure: cells, answered from tables and traced exactly where these lose; a tree with "
+         "Line Spaces, bvh or ntree; or wide, the tree for exact rays alone. Where it is left out: cells as "
+         "fine as they are worth it, wide where none are, and bvh with an option of Line Spaces")
+      ->check(CLI::IsMember({"cells", "bvh", "ntree", "wide"}));
   app.add_option("--cells", a.cells,
                  "Cells along the longest side of the grid of --base cells; 0: chosen from the scene")
       ->check(CLI::Range(0u, LSP_MAX_CELLS));
@@ -162,8 +163,8 @@ int main(int argc, char** argv) {
   app.add_option("--compress", a.compress,
                  "Pack the sections: a smaller file, which is unpacked into memory and not mapped")
       ->check(CLI::IsMember({"none", "zstd"}));
-  app.add_option("--align", a.align, "Alignment of sections in bytes")
-      ->check(CLI::IsMember({256, 4096, 65536}));
+  app.add_option("--align", a.align, "Alignment of sections in bytes; 0: 4096, of the smallest files 256")
+      ->check(CLI::IsMember({0, 256, 4096, 65536}));
   app.add_option("--threads", a.threads, "Threads, 0: all cores");
   app.add_option("--memory-limit", a.memory_limit,
                  "Memory the bake may use, as 2GiB; Line Spaces beyond it wait in temporary files beside the "

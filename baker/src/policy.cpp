@@ -26,7 +26,7 @@ const std::map<std::string, Preset> kPresets = {
 const std::vector<Quality> kLadder = {{4, 7, 5}, {4, 9, 5}, {6, 9, 5}, {6, 11, 9}, {8, 11, 9}, {8, 13, 9}};
 constexpr uint64_t kErrorRays = 65536;
 const std::map<std::string, Base> kBases = {
-    {"bvh", Base::kBvh}, {"ntree", Base::kNTree}, {"cells", Base::kCells}};
+    {"bvh", Base::kBvh}, {"ntree", Base::kNTree}, {"cells", Base::kCells}, {"wide", Base::kWide}};
 
 // What only Line Spaces have.
 bool asks_for_line_spaces(const Arguments& a) {
@@ -53,6 +53,10 @@ void check(const Arguments& a) {
     throw Failure(Exit::kUsage, "", "--branching and --levels need --base ntree");
   const bool cells = a.base == "cells";
   if (a.cells && !cells) throw Failure(Exit::kUsage, "", "--cells needs --base cells");
+  if (a.base == "wide" && (asks_for_line_spaces(a) || a.max_error > 0 || a.no_exact))
+    throw Failure(Exit::kUsage, "",
+                  "--base wide has no tables: leave it out, or --no-exact, --max-error and what is of Line "
+                  "Spaces");
   if (cells && asks_for_line_spaces(a))
     throw Failure(Exit::kUsage, "",
                   "cells have tables of their own: leave out --base cells and --cells, or what is of Line "
@@ -124,6 +128,47 @@ Chosen bake_cells(const Mesh& mesh, const Arguments& a, const Progress& progress
   return chosen;
 }
 
+// Of what depends on the grid.
+uint64_t table_bytes(const Baked& baked) {
+  const SectionArrays arrays{baked};
+  uint64_t bytes = 0;
+#define LSP_ARRAY_SECTION(Name, TYPE, code, Element, flag, base, feature, owed, member, ...) \
+  if ((feature) == LSP_FEATURE_CELLS) bytes += uint64_t{arrays.member.size()} * sizeof(Element);
+#include "lsp/sections.def"
+  return bytes;
+}
+
+// Cells as fine as they are worth their bytes; none where a ray through them takes as long as an exact one.
+Chosen bake_weighed(const Mesh& mesh, Arguments& a, const Progress& progress) {
+  constexpr double kTableShare = 3;  // of the exact data
+  constexpr uint64_t kPadding =
+      8 << 12;                    // about: of the eight sections of tables, and what is stated of them
+  constexpr double kWorth = 0.9;  // of the time of an exact ray
+  constexpr int kBakes = 3;
+  BakeOptions options = bake_options(a);
+  options.table_share = kTableShare;
+  for (int bakes = 1;; ++bakes) {
+    Chosen chosen;
+    chosen.baked = bake(mesh, options, progress);
+    const double most = kTableShare * double(exact_bytes(chosen.baked));
+    const double tables = double(table_bytes(chosen.baked) + kPadding);
+    if (tables > most) {
+      const double longest = longest_side(chosen.baked.header.cells);
+      options.cells = uint32_t(longest * std::min(std::sqrt(most / tables), 1 - 1 / longest));
+      if (options.cells > 0 && bakes < kBakes) continue;
+      leave_out_tables(chosen.baked,
+                       "of so small a mesh, they would be more than three times its exact data");
+    } else if (chosen.baked.cost.cells > kWorth * chosen.baked.cost.exact) {
+      leave_out_tables(chosen.baked, "a ray through them would take as long as an exact one");
+    } else {
+      chosen.error = measure_error(chosen.baked, kErrorRays);
+      return chosen;
+    }
+    a.base = "wide";
+    return chosen;
+  }
+}
+
 void leave_out_exact(Baked& baked, bool cells) {
   if (cells)
     keep_tables_only(baked);
@@ -138,7 +183,9 @@ void leave_out_exact(Baked& baked, bool cells) {
 Chosen bake_accurately(const Mesh& mesh, Arguments& a, const Progress& progress) {
   const bool cells = a.base == "cells";
   Chosen chosen;
-  if (cells) {
+  if (a.weigh_tables) {
+    chosen = bake_weighed(mesh, a, progress);
+  } else if (cells) {
     chosen = bake_cells(mesh, a, progress);
   } else if (a.max_error > 0) {
     chosen = climb(mesh, a, progress);
@@ -166,16 +213,6 @@ Chosen bake_accurately(const Mesh& mesh, Arguments& a, const Progress& progress)
                 "needs a file of %.2f MB at least, over the %.2f MB of --max-size: allow more%s",
                 double(bytes) * 1e-6, double(a.max_size) * 1e-6, remedy);
   throw Failure(Exit::kLimit, a.inputs[0].string(), text);
-}
-
-// Of what depends on the grid.
-uint64_t table_bytes(const Baked& baked) {
-  const SectionArrays arrays{baked};
-  uint64_t bytes = 0;
-#define LSP_ARRAY_SECTION(Name, TYPE, code, Element, flag, base, feature, owed, member, ...) \
-  if ((feature) == LSP_FEATURE_CELLS) bytes += uint64_t{arrays.member.size()} * sizeof(Element);
-#include "lsp/sections.def"
-  return bytes;
 }
 
 // The bake as it is asked for if its file is small enough, else that with the most cells on the longest side
@@ -221,7 +258,10 @@ Chosen bake_within(const Mesh& mesh, Arguments& a, const Progress& progress, con
 }  // namespace
 
 void settle(Arguments& a) {
+  const bool asked = !a.base.empty() || a.cells != 0 || a.no_exact || a.max_error > 0 || a.max_size != 0 ||
+                     a.preset == "accurate";
   a.base = base_of(a);
+  a.weigh_tables = !asked && a.base == "cells";
   check(a);
   const Preset& preset = kPresets.at(a.preset);
   const bool ntree = a.base == "ntree";

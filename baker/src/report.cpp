@@ -25,9 +25,12 @@ uint64_t peak_memory_bytes() {
   return 0;
 }
 
-std::string megabytes(uint64_t bytes) {
+std::string size_text(uint64_t bytes) {
   char text[32];
-  std::snprintf(text, sizeof text, "%.2f MB", double(bytes) / 1e6);
+  if (bytes < 1000000)
+    std::snprintf(text, sizeof text, "%.2f kB", double(bytes) / 1e3);
+  else
+    std::snprintf(text, sizeof text, "%.2f MB", double(bytes) / 1e6);
   return text;
 }
 
@@ -113,14 +116,14 @@ void print_report(const BakeReport& done) {
   for (const std::string& s : baked.skipped) std::printf("skipped     %s\n", s.c_str());
   std::printf("time        import %.2f s, tree %.2f s, Line Spaces %.2f s, write %.2f s; peak memory %s\n",
               done.import_seconds, baked.tree_seconds, baked.line_space_seconds, done.write_seconds,
-              megabytes(peak_memory_bytes()).c_str());
+              size_text(peak_memory_bytes()).c_str());
   for (const WrittenSection& s : done.written.sections) {
-    std::printf("section     %s %12s", s.name.c_str(), megabytes(s.bytes).c_str());
-    if (s.stored_bytes != s.bytes) std::printf(", packed %s", megabytes(s.stored_bytes).c_str());
+    std::printf("section     %s %12s", s.name.c_str(), size_text(s.bytes).c_str());
+    if (s.stored_bytes != s.bytes) std::printf(", packed %s", size_text(s.stored_bytes).c_str());
     std::printf("\n");
   }
   std::printf("wrote       %s, %s\n", done.arguments.output.c_str(),
-              megabytes(done.written.file_bytes).c_str());
+              size_text(done.written.file_bytes).c_str());
   std::fflush(stdout);
 }
 

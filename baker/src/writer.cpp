@@ -62,6 +62,15 @@ std::vector<std::byte> compress(std::span<const std::byte> bytes, int level) {
   return out;
 }
 
+// That of a page, so that the file can be imported into a device where it is mapped; a file that would be
+// padding mostly is copied in no time.
+uint32_t choose_alignment(const std::vector<Section>& sections) {
+  constexpr uint64_t kSmall = 16384;
+  uint64_t bytes = 0;
+  for (const Section& s : sections) bytes += s.bytes.size();
+  return bytes < kSmall ? 256 : 4096;
+}
+
 // What the content id covers of a section: nothing that depends on packing or alignment.
 struct ContentEntry {
   uint32_t type, element_bytes;
@@ -169,7 +178,8 @@ Layout lay_out(Baked& baked, const std::string& meta, const WriteOptions& option
     }
 
   // The header states the raw form's alignment; a packed file is never mapped and lies closer.
-  const uint64_t alignment = any_packed ? 256 : options.alignment;
+  const uint32_t raw_alignment = options.alignment ? options.alignment : choose_alignment(sections);
+  const uint64_t alignment = any_packed ? 256 : raw_alignment;
   LspHeader& h = baked.header;
   h.magic_0 = LSP_MAGIC_0;
   h.magic_1 = LSP_MAGIC_1;
@@ -178,7 +188,7 @@ Layout lay_out(Baked& baked, const std::string& meta, const WriteOptions& option
   h.header_bytes = sizeof(LspHeader);
   h.section_count = uint32_t(sections.size());
   h.section_table_offset = sizeof(LspHeader);
-  h.alignment = options.alignment;
+  h.alignment = raw_alignment;
 
   std::vector<LspSection> table;
   std::vector<ContentEntry> content;

@@ -11,8 +11,8 @@
 namespace lsp {
 
 struct WriteOptions {
-  uint32_t alignment = 4096;  // 256, 4096 or 65536
-  bool zstd = false;          // pack the sections; a packed file cannot be mapped, only unpacked
+  uint32_t alignment = 0;  // 256, 4096 or 65536; 0: 4096, and 256 of a file that is not much longer
+  bool zstd = false;       // pack the sections; a packed file cannot be mapped, only unpacked
   int zstd_level = 12;
   uint64_t memory_limit = 0;  // for packing, which holds a section and its packed form; 0: none
 };

@@ -275,6 +275,7 @@ std::vector<ValidFile> valid_files() {
       encode(full_cells_scene(false)));
   add("wide", "cells beside wide nodes, three levels of them", encode(full_wide_scene()));
   add("wide-packed", "the same, packed", packed(full_wide_scene()));
+  add("wide-alone", "wide nodes without cells", encode(wide_alone_scene()));
   add("wide-empty", "no geometry: no wide node, the feature bit is set all the same",
       encode(empty_wide_scene()));
   return files;

@@ -26,6 +26,33 @@ void wide_header(Collector& c, RuleId rule, const char* mutation,
   c.add(rule, mutation, std::move(bytes), {}, "-wide");
 }
 
+void alone_header(Collector& c, RuleId rule, const char* mutation,
+                  const std::function<void(LspHeader&)>& change) {
+  Bytes bytes = encode(wide_alone_scene());
+  change(header_of(bytes));
+  repair_hashes(bytes);
+  c.add(rule, mutation, std::move(bytes), {}, "-wide-alone");
+}
+
+// Wide nodes without cells.
+void alone(Collector& c) {
+  alone_header(c, RuleId::kBaseStructure, "WIDE_BASE is clear, base_structure is 4",
+               [](LspHeader& h) { h.required_features &= ~LSP_FEATURE_WIDE_BASE; });
+  alone_header(c, RuleId::kWideNodes, "WIDE_BASE is set, WIDE and EXACT are clear",
+               [](LspHeader& h) { h.required_features &= ~(LSP_FEATURE_WIDE | LSP_FEATURE_EXACT); });
+  alone_header(c, RuleId::kCellsGrid, "a grid is stated of wide nodes alone",
+               [](LspHeader& h) { h.cells = full_wide_scene().header.cells; });
+  alone_header(c, RuleId::kQualityRange, "the quality balanced of wide nodes alone heeds a class of loss",
+               [](LspHeader& h) { h.quality[0] = 1; });
+  Image with_grid = wide_alone_scene();
+  with_grid.cell_words = {0};
+  c.add(RuleId::kOtherBase, "the file of wide nodes alone has a CGRD", encode(with_grid), {}, "-wide-alone");
+  Image with_bvh = wide_alone_scene();
+  with_bvh.nodes = full_scene().nodes;
+  c.add(RuleId::kOtherBase, "the file of wide nodes alone has a NODE", encode(with_bvh), {},
+        "-wide-alone-node");
+}
+
 void header_and_table(Collector& c) {
   wide_header(c, RuleId::kMaxStack, "max_stack of wide nodes is 97", [](LspHeader& h) { h.max_stack = 97; });
   wide_header(c, RuleId::kMaxLeaf, "max_leaf_triangles of wide nodes is 17",
@@ -118,6 +145,7 @@ void geometry(Collector& c) {
 
 void break_wide_nodes(Collector& c) {
   header_and_table(c);
+  alone(c);
   nodes(c);
   geometry(c);
 }

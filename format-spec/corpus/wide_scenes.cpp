@@ -91,6 +91,17 @@ class Builder {
   uint32_t next_triangle_ = 0;
 };
 
+void clear_cells(Image& image) {
+  image.cell_words.clear();
+  image.filled_cells.clear();
+  image.entries.clear();
+  image.planes.clear();
+  image.plane_records.clear();
+  image.splits.clear();
+  image.cell_nodes.clear();
+  image.cell_references.clear();
+}
+
 void need(LspHeader& h) {
   h.required_features |= LSP_FEATURE_WIDE;
   h.version_minor = lsp_version_minor(h.required_features);
@@ -127,6 +138,18 @@ Image full_wide_scene() {
   return image;
 }
 
+Image wide_alone_scene() {
+  Image image = full_wide_scene();
+  clear_cells(image);
+  LspHeader& h = image.header;
+  h.base_structure = LSP_BASE_WIDE;
+  h.required_features = (h.required_features & ~LSP_FEATURE_CELLS) | LSP_FEATURE_WIDE_BASE;
+  h.version_minor = lsp_version_minor(h.required_features);
+  h.cells = {};
+  for (uint32_t& dial : h.quality) dial = 0;
+  return image;
+}
+
 Image empty_wide_scene() {
   Image image = full_cells_scene();
   LspHeader& h = image.header;
@@ -138,18 +161,12 @@ Image empty_wide_scene() {
   h.max_stack = 1;
   h.cells.cells_x = 1;
   h.cells.origin_entry_first = 0;
+  clear_cells(image);
   image.cell_words = {0};
   image.nodes.clear();
   image.triangles.clear();
   image.normals.clear();
   image.materials.clear();
-  image.filled_cells.clear();
-  image.entries.clear();
-  image.planes.clear();
-  image.plane_records.clear();
-  image.splits.clear();
-  image.cell_nodes.clear();
-  image.cell_references.clear();
   return image;
 }
 

@@ -95,15 +95,16 @@ void check_root(const LspHeader& header, Report& report) {
                            " of " + std::to_string(header.line_space_count));
 }
 
-// Wide nodes, of cells alone, and nothing beside them that exact rays walk.
+// Wide nodes, of cells or alone, and nothing beside them that exact rays walk.
 void check_wide_nodes(const LspHeader& header, Report& report) {
   const uint32_t features = header.required_features;
   if ((features & LSP_FEATURE_WIDE) == 0) {
-    if (header.wide_node_count != 0)
+    if (header.wide_node_count != 0 || is_wide(header))
       LSP_HEADER_FINDING(kWideNodes, wide_node_count,
                          "is " + std::to_string(header.wide_node_count) + ", but WIDE is clear");
-  } else if (!has_cells(header) || (features & LSP_FEATURE_EXACT) == 0) {
-    LSP_HEADER_FINDING(kWideNodes, required_features, "WIDE is set without EXACT or without cells");
+  } else if (!(has_cells(header) || is_wide(header)) || (features & LSP_FEATURE_EXACT) == 0) {
+    LSP_HEADER_FINDING(kWideNodes, required_features,
+                       "WIDE is set without EXACT, or in a file neither of cells nor of wide nodes alone");
   } else if (header.node_count != 0 || header.line_space_count != 0) {
     LSP_HEADER_FINDING(kWideNodes, node_count,
                        std::to_string(header.node_count) + " nodes of a BVH and " +
@@ -153,17 +154,30 @@ void check_grid(const LspHeader& header, Report& report) {
     }
 }
 
+// The feature bit that a base structure has; nothing for one that there is not.
+std::optional<uint32_t> base_feature(uint32_t base) {
+  switch (base) {
+    case LSP_BASE_BVH:
+      return 0;
+    case LSP_BASE_NTREE:
+      return LSP_FEATURE_NTREE;
+    case LSP_BASE_CELLS:
+      return LSP_FEATURE_CELLS;
+    case LSP_BASE_WIDE:
+      return LSP_FEATURE_WIDE_BASE;
+    default:
+      return std::nullopt;
+  }
+}
+
 void check_base(const LspHeader& header, Report& report) {
-  const bool ntree = header.base_structure == LSP_BASE_NTREE;
-  const bool cells = has_cells(header);
-  const uint32_t features = header.required_features & (LSP_FEATURE_NTREE | LSP_FEATURE_CELLS);
-  if ((header.base_structure != LSP_BASE_BVH && !ntree && !cells) || features != (ntree   ? LSP_FEATURE_NTREE
-                                                                                  : cells ? LSP_FEATURE_CELLS
-                                                                                          : 0))
+  const bool ntree = is_ntree(header);
+  constexpr uint32_t kBases = LSP_FEATURE_NTREE | LSP_FEATURE_CELLS | LSP_FEATURE_WIDE_BASE;
+  const uint32_t features = header.required_features & kBases;
+  if (base_feature(header.base_structure) != features)
     LSP_HEADER_FINDING(kBaseStructure, base_structure,
-                       "is " + std::to_string(header.base_structure) + " with the feature bits NTREE " +
-                           (features & LSP_FEATURE_NTREE ? "set" : "clear") + " and CELLS " +
-                           (features & LSP_FEATURE_CELLS ? "set" : "clear"));
+                       "is " + std::to_string(header.base_structure) + " with " + hex(features) +
+                           " of the feature bits NTREE, CELLS and WIDE_BASE");
   const lsp_float3& lo = header.ntree_lo;
   const bool zero = header.ntree_branching == 0 && header.ntree_depth == 0 && header.cell_count == 0 &&
                     header.reference_count == 0 && lo.x == 0 && lo.y == 0 && lo.z == 0 &&

@@ -76,11 +76,12 @@ class TableCheck {
     if (wrong) LSP_TABLE_FINDING(kSectionFlags, i, flags, "flags are " + std::to_string(section.flags));
   }
 
-  // The tree of one base structure in the file of the other.
+  // The tree of one base structure in the file of another.
   void base(uint64_t i, int kind) {
     if (kind != kKinds && !holds_base(view_.header, info(static_cast<Kind>(kind)).base))
-      LSP_TABLE_FINDING(kOtherBase, i, type,
-                        is_ntree(view_.header) ? "the file holds an NTree" : "the file holds no NTree");
+      LSP_TABLE_FINDING(
+          kOtherBase, i, type,
+          "a file of base structure " + std::to_string(view_.header.base_structure) + " does not have it");
   }
 
   bool sizes(uint64_t i, int kind) {

@@ -26,7 +26,7 @@ Json feature_names(uint32_t features) {
                 {LSP_FEATURE_NORMALS, "normals"}, {LSP_FEATURE_MATERIALS, "materials"},
                 {LSP_FEATURE_NTREE, "ntree"},     {LSP_FEATURE_BINARY, "binary"},
                 {LSP_FEATURE_CELLS, "cells"},     {LSP_FEATURE_COVERAGE, "coverage"},
-                {LSP_FEATURE_WIDE, "wide"}};
+                {LSP_FEATURE_WIDE, "wide"},       {LSP_FEATURE_WIDE_BASE, "wide base"}};
   Json names = Json::array();
   for (const auto& feature : kNames)
     if (features & feature.bit) names.push_back(feature.name);
@@ -34,7 +34,10 @@ Json feature_names(uint32_t features) {
 }
 
 const char* base_name(uint32_t base) {
-  return base == LSP_BASE_NTREE ? "ntree" : base == LSP_BASE_CELLS ? "cells" : "bvh";
+  return base == LSP_BASE_NTREE   ? "ntree"
+         : base == LSP_BASE_CELLS ? "cells"
+         : base == LSP_BASE_WIDE  ? "wide"
+                                  : "bvh";
 }
 
 Json sections(const FileView& view) {

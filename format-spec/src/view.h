@@ -21,7 +21,7 @@ bool cells_readable(const LspHeader& header);
 
 // Whether exact rays walk wide nodes: WNOD stands in the place of NODE.
 inline bool walks_wide(const LspHeader& header) {
-  return has_cells(header) && (header.required_features & LSP_FEATURE_WIDE) != 0;
+  return (has_cells(header) || is_wide(header)) && (header.required_features & LSP_FEATURE_WIDE) != 0;
 }
 
 // How many elements the header says that a section has; nothing for META, and for GRID where the header's

@@ -90,18 +90,22 @@ lsp_status check_limits(const LspHeader& header, lsp_error* error) {
     return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, alignment),
                 "states an alignment of %u, not 256, 4096 or 65536", header.alignment);
   }
-  const uint32_t features = header.required_features & (LSP_FEATURE_NTREE | LSP_FEATURE_CELLS);
-  const uint32_t base = features == LSP_FEATURE_NTREE   ? LSP_BASE_NTREE
-                        : features == LSP_FEATURE_CELLS ? LSP_BASE_CELLS
-                        : features == 0                 ? LSP_BASE_BVH
-                                                        : 0;
+  const uint32_t features =
+      header.required_features & (LSP_FEATURE_NTREE | LSP_FEATURE_CELLS | LSP_FEATURE_WIDE_BASE);
+  const uint32_t base = features == LSP_FEATURE_NTREE       ? LSP_BASE_NTREE
+                        : features == LSP_FEATURE_CELLS     ? LSP_BASE_CELLS
+                        : features == LSP_FEATURE_WIDE_BASE ? LSP_BASE_WIDE
+                        : features == 0                     ? LSP_BASE_BVH
+                                                            : 0;
   if (header.base_structure != base) {
     return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, base_structure),
                 "states base structure %u, which its features contradict", header.base_structure);
   }
-  if ((header.required_features & LSP_FEATURE_WIDE) != 0 && base != LSP_BASE_CELLS) {
+  const bool wide = (header.required_features & LSP_FEATURE_WIDE) != 0;
+  if (base == LSP_BASE_WIDE ? !wide : wide && base != LSP_BASE_CELLS) {
     return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, required_features),
-                "has wide nodes, which base structure %u does not have", header.base_structure);
+                "%s wide nodes, which base structure %u %s", wide ? "has" : "lacks", header.base_structure,
+                wide ? "does not have" : "is made of");
   }
   if (!finite(header.bounds_min) || !finite(header.bounds_max) || !std::isfinite(header.normal_angle_cos) ||
       !std::isfinite(header.plane_tolerance)) {

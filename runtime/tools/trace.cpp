@@ -169,7 +169,7 @@ nlohmann::ordered_json to_json(const Options& options, const TraceRequest& reque
   json["bytes_imported"] = report.bytes_imported;
   json["bytes_uploaded"] = report.bytes_uploaded;
   json["retraced"] = report.retraced;
-  if (scene.any_has(LSP_FEATURE_CELLS)) {
+  if (scene.any_has(LSP_FEATURE_CELLS | LSP_FEATURE_WIDE_BASE)) {
     json["quality"] = options.trace.quality_name();
     if (options.trace.max_loss >= 0) json["max_loss"] = options.trace.max_loss;
     json["steps_per_ray"] = per(static_cast<double>(counts.nodes), counts.rays);

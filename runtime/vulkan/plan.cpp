@@ -53,6 +53,8 @@ extern "C" lsp_status lsp_vulkan_plan_buffers(const lsp_scene* scene, uint32_t u
                           : cells                            ? LSP_BASE_BVH
                                                              : plan->base_structure;
   plan->addresses = (uses & LSP_USE_ADDRESSES_ALWAYS) != 0 ? 1 : 0;
+  // Wide nodes alone answer approximate rays exactly.
+  if (plan->base_structure == LSP_BASE_WIDE && (uses & LSP_USE_APPROXIMATE) != 0) uses |= LSP_USE_EXACT;
   for (const Wanted& wanted : kWanted) {
     if ((uses & wanted.uses) == 0) continue;
     // Approximate rays of cells never see the BVH.

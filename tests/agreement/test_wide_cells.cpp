@@ -22,9 +22,10 @@ namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
+// Cells along the longest side; 0: wide nodes alone.
 lsp::Baked bake_cells(const Mesh& mesh, uint32_t cells) {
   BakeOptions options;
-  options.base = Base::kCells;
+  options.base = cells == 0 ? Base::kWide : Base::kCells;
   options.cells = cells;
   return bake(mesh, options);
 }
@@ -38,24 +39,23 @@ struct Scene {
   lsp::Baked baked;
 };
 
-const std::vector<Scene>& scenes() {
-  static const std::vector<Scene> all = [] {
-    std::vector<Scene> made;
-    made.push_back({"ball", bake_cells(sphere(12), 6)});
-    made.push_back({"soup", bake_cells(soup(400, 0.5f), 5)});
-    Mesh far = sphere(8);
-    move(far, 1e-3f, {7, -3, 5});
-    made.push_back({"small, from afar", bake_cells(far, 4)});
-    Mesh flat;
-    add_triangle(flat, {0, 0, 0}, {1, 0, 0}, {0, 1, 0});
-    made.push_back({"a triangle", bake_cells(flat, 3)});
-    // Planes of a size apart: large empty spaces, which rays jump over.
-    Mesh apart = sphere(6);
-    add_triangle(apart, {40, -20, -20}, {40, 20, -20}, {40, 0, 30});
-    made.push_back({"far apart", bake_cells(apart, 24)});
-    return made;
-  }();
-  return all;
+// With cells, or wide nodes alone.
+std::vector<Scene> scenes(bool cells) {
+  const auto of = [&](const Mesh& mesh, uint32_t number) { return bake_cells(mesh, cells ? number : 0); };
+  std::vector<Scene> made;
+  made.push_back({"ball", of(sphere(12), 6)});
+  made.push_back({"soup", of(soup(400, 0.5f), 5)});
+  Mesh far = sphere(8);
+  move(far, 1e-3f, {7, -3, 5});
+  made.push_back({"small, from afar", of(far, 4)});
+  Mesh flat;
+  add_triangle(flat, {0, 0, 0}, {1, 0, 0}, {0, 1, 0});
+  made.push_back({"a triangle", of(flat, 3)});
+  // Planes of a size apart: large empty spaces, which rays jump over.
+  Mesh apart = sphere(6);
+  add_triangle(apart, {40, -20, -20}, {40, 20, -20}, {40, 0, 30});
+  made.push_back({"far apart", of(apart, 24)});
+  return made;
 }
 
 // Numbers of every size and sign, the ends of the range among them.
@@ -155,7 +155,7 @@ class WideCellsTest : public testing::TestWithParam<size_t> {
 };
 
 TEST_P(WideCellsTest, SameBitsAsSingleRays) {
-  for (const Scene& of : scenes()) {
+  for (const Scene& of : scenes(true)) {
     const lsp_scene scene = view(of.baked);
     const std::vector<LspRay> rays = rays_of(of.baked);
     std::vector<LspHit> wide(rays.size());
@@ -170,8 +170,9 @@ TEST_P(WideCellsTest, SameBitsAsSingleRays) {
 }
 
 TEST_P(WideCellsTest, AnyNumberOfRays) {
-  const lsp_scene scene = view(scenes()[0].baked);
-  const std::vector<LspRay> rays = rays_of(scenes()[0].baked);
+  const lsp::Baked baked = bake_cells(sphere(12), 6);
+  const lsp_scene scene = view(baked);
+  const std::vector<LspRay> rays = rays_of(baked);
   const lsp_trace_options options{LSP_TRACE_APPROXIMATE, 0};
   const auto single = single_rays(scene, options, rays);
   for (const size_t count : {0, 1, 2, 3, 5, 8, 15, 17, 63, 64, 65, 129, 1000}) {
@@ -235,7 +236,7 @@ class WideExactTest : public testing::TestWithParam<size_t> {
 };
 
 TEST_P(WideExactTest, SameBitsAsSingleRays) {
-  for (const Scene& of : scenes()) {
+  for (const Scene& of : scenes(false)) {
     const lsp_scene scene = view(of.baked);
     ASSERT_NE(scene.wide_nodes, nullptr) << of.name;
     const std::vector<LspRay> rays = rays_of(of.baked);
@@ -257,7 +258,7 @@ TEST_P(WideExactTest, SameBitsInHugeScenes) {
   for (const float scale : {1e13f, 1e17f}) {
     Mesh mesh = sphere(8);
     move(mesh, scale, {0, 0, 0});
-    const lsp::Baked baked = bake_cells(mesh, 4);
+    const lsp::Baked baked = bake_cells(mesh, 0);
     const lsp_scene scene = view(baked);
     const std::vector<LspRay> rays = rays_of(baked);
     std::vector<LspHit> wide(rays.size());
@@ -270,9 +271,11 @@ TEST_P(WideExactTest, SameBitsInHugeScenes) {
 // Nodes that say anything at all: the trace ends, reads nothing outside, and says where it could not finish.
 TEST_P(WideExactTest, EndsOnDamagedFiles) {
   std::mt19937 random(5);
+  lsp::Baked baked = bake_cells(sphere(12), 0);
+  const std::vector<LspRay> rays = surface_rays(baked, 2000, 1);
+  const std::vector<LspWideNode> nodes = baked.wide.nodes;
   for (int round = 0; round < 12; ++round) {
-    lsp::Baked baked = bake_cells(sphere(12), 6);
-    const std::vector<LspRay> rays = surface_rays(baked, 2000, 1);
+    baked.wide.nodes = nodes;
     auto* bytes = reinterpret_cast<uint8_t*>(baked.wide.nodes.data());
     const size_t size = baked.wide.nodes.size() * sizeof(LspWideNode);
     for (size_t k = 0; k < size / 64 + 1; ++k) bytes[random() % size] = static_cast<uint8_t>(random());

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
@@ -29,9 +30,12 @@ class LspBake : public ::testing::Test {
   }
   // A bumpy grid: enough triangles to give every option something to do.
   void write_grid(const char* name, int size) {
+    write_heights(name, size, [](int i, int j) { return double((i * 7 + j * 13) % 5); });
+  }
+  void write_heights(const char* name, int size, double (*height)(int, int)) {
     std::ofstream obj(folder_ / name);
     for (int i = 0; i <= size; ++i)
-      for (int j = 0; j <= size; ++j) obj << "v " << i << " " << (i * 7 + j * 13) % 5 << " " << j << "\n";
+      for (int j = 0; j <= size; ++j) obj << "v " << i << " " << height(i, j) << " " << j << "\n";
     for (int i = 0; i < size; ++i)
       for (int j = 0; j < size; ++j) {
         const int a = i * (size + 1) + j + 1;
@@ -79,7 +83,9 @@ TEST_F(LspBake, TheBaseFollowsFromTheOptions) {
     const size_t at = bytes.find("\"base\":\"");
     return at == std::string::npos ? "" : bytes.substr(at + 8, bytes.find('"', at + 8) - at - 8);
   };
-  EXPECT_EQ(base(""), "cells");
+  EXPECT_EQ(base(""), "wide") << "no table is worth its bytes";
+  EXPECT_EQ(base("--preset accurate"), "cells");
+  EXPECT_EQ(base("--base wide"), "wide");
   EXPECT_EQ(base("--max-error 50"), "cells");
   EXPECT_EQ(base("--cells 3 --preset fast"), "cells");
   EXPECT_EQ(base("--no-exact"), "cells");
@@ -89,6 +95,52 @@ TEST_F(LspBake, TheBaseFollowsFromTheOptions) {
   EXPECT_EQ(base("--base ntree"), "ntree");
   EXPECT_EQ(run("small.obj -o a.lsp --cells 3 --depth 4"), 1);
   EXPECT_NE(read("err").find("cells have tables of their own"), std::string::npos) << read("err");
+  for (const char* option : {"--depth 4", "--no-exact", "--max-error 1"}) {
+    EXPECT_EQ(run(std::string("small.obj -o a.lsp --base wide ") + option), 1) << option;
+    EXPECT_NE(read("err").find("--base wide has no tables"), std::string::npos) << read("err");
+  }
+}
+
+// Bytes of tables and of what exact rays need, by the report.
+struct Bytes {
+  uint64_t tables = 0, exact = 0, file = 0;
+};
+Bytes bytes_of(const nlohmann::json& report) {
+  Bytes bytes;
+  for (const auto& section : report["sections"]) {
+    const std::string name = section["name"];
+    const bool exact = name == "TRIA" || name == "NRML" || name == "MATL" || name == "WNOD";
+    (exact ? bytes.exact : bytes.tables) += name == "META" ? 0 : section["bytes"].get<uint64_t>();
+  }
+  bytes.file = report["file_bytes"];
+  return bytes;
+}
+
+TEST_F(LspBake, SmallThingsStaySmall) {
+  write_grid("two.obj", 1);
+  write_heights("dunes.obj", 48, [](int i, int j) { return 6 * std::sin(i * 0.13) * std::sin(j * 0.11); });
+  for (const char* name : {"two", "dunes"}) {
+    ASSERT_EQ(run(std::string(name) + ".obj -o a.lsp --preset fast --json"), 0) << read("err");
+    const auto report = nlohmann::json::parse(read("out"));
+    const Bytes bytes = bytes_of(report);
+    EXPECT_LE(bytes.tables, 3 * bytes.exact) << name;
+    if (name == std::string("dunes")) {
+      EXPECT_LE(bytes.file, 4 * bytes.exact);
+      EXPECT_GT(bytes.tables, bytes.exact) << "tables of as many cells as there is room for";
+      continue;
+    }
+    EXPECT_EQ(bytes.tables, 0u);
+    EXPECT_EQ(report["skipped"][0],
+              "tables: of so small a mesh, they would be more than three times its exact data");
+    EXPECT_LT(bytes.file, 4096u) << "mostly padding";
+    EXPECT_TRUE(report["error"].is_null()) << "every ray is exact";
+  }
+  // Here a cell's loss is everywhere, and rays leave soon.
+  ASSERT_EQ(run("grid.obj -o b.lsp --preset fast --json"), 0) << read("err");
+  EXPECT_EQ(nlohmann::json::parse(read("out"))["skipped"][0],
+            "tables: a ray through them would take as long as an exact one");
+  ASSERT_EQ(run("two.obj -o b.lsp --base cells --json"), 0) << read("err");
+  EXPECT_GT(bytes_of(nlohmann::json::parse(read("out"))).tables, 0u) << "asked for";
 }
 
 TEST_F(LspBake, HelpBeginsWithWhatMostPeopleNeed) {
@@ -141,7 +193,7 @@ TEST_F(LspBake, FilesAreNoLongerThanAskedFor) {
     return nlohmann::json::parse(read("info"))["provenance"]["options"]["cells"].get<int>();
   };
   write_grid("hills.obj", 24);
-  ASSERT_EQ(run("hills.obj -o all.lsp --preset fast"), 0) << read("err");
+  ASSERT_EQ(run("hills.obj -o all.lsp --preset fast --base cells"), 0) << read("err");
   const uint64_t all = fs::file_size(folder_ / "all.lsp"), half = all / 2;
   ASSERT_EQ(run("hills.obj -o half.lsp --preset fast --max-size " + std::to_string(half)), 0) << read("err");
   EXPECT_LE(fs::file_size(folder_ / "half.lsp"), half);

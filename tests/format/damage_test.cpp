@@ -23,11 +23,12 @@ Report check_exact(const Bytes& bytes, Level level = Level::kGeometry) {
 
 // Of every base structure: every test below runs on the full scene of each.
 std::vector<Image> full_scenes() {
-  return {full_scene(), full_ntree_scene(), full_cells_scene(), full_wide_scene()};
+  return {full_scene(), full_ntree_scene(), full_cells_scene(), full_wide_scene(), wide_alone_scene()};
 }
 
 TEST(Damage, EveryPrefixOfAValidFileIsRefused) {
-  for (const char* name : {"full", "packed", "ntree-full", "ntree-packed", "cells", "wide", "wide-packed"}) {
+  for (const char* name :
+       {"full", "packed", "ntree-full", "ntree-packed", "cells", "wide", "wide-packed", "wide-alone"}) {
     for (const ValidFile& file : valid_files()) {
       if (file.name != name) continue;
       for (size_t size = 0; size < file.bytes.size(); ++size) {

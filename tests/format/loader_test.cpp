@@ -152,7 +152,8 @@ TEST(Loader, AgreesOnTenThousandRandomMutations) {
 }
 
 TEST(Loader, UnpackOfPackIsTheSameFile) {
-  for (Image image : {full_scene(), full_ntree_scene(), full_cells_scene(), full_wide_scene()})
+  for (Image image :
+       {full_scene(), full_ntree_scene(), full_cells_scene(), full_wide_scene(), wide_alone_scene()})
     for (uint32_t alignment : {256u, 4096u, 65536u}) {
       image.alignment = alignment;
       const Bytes raw = encode(image);

@@ -155,15 +155,16 @@ CellGrid build_cell_grid(std::span<const LspTriangle> triangles, const Box& boun
   return finish(sort_into_cells(triangles, bounds, longest));
 }
 
-CellGrid choose_cell_grid(std::span<const LspTriangle> triangles, const Box& bounds) {
+CellGrid choose_cell_grid(std::span<const LspTriangle> triangles, const Box& bounds, size_t most) {
   // Filled cells grow with the square of the cells on the longest side, or a little faster.
-  const size_t wanted = std::clamp(triangles.size() / kTrianglesPerCell, size_t(8), kWantedCells);
+  const size_t wanted = std::min(std::clamp(triangles.size() / kTrianglesPerCell, size_t(8), kWantedCells),
+                                 std::max<size_t>(most, 1));
   uint32_t longest = 8;
   CellGrid grid = sort_into_cells(triangles, bounds, longest);
   for (int attempt = 0; attempt < 4; ++attempt) {
     const double more = double(wanted) / double(std::max<size_t>(1, grid.cells.size()));
     if (more > 0.8 && more < 1.25) break;
-    const auto next = uint32_t(std::clamp(std::lround(longest * std::sqrt(more)), 2l, long(kMostLongest)));
+    const auto next = uint32_t(std::clamp(std::lround(longest * std::sqrt(more)), 1l, long(kMostLongest)));
     if (next == longest) break;
     longest = next;
     grid = sort_into_cells(triangles, bounds, longest);

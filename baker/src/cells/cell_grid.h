@@ -46,8 +46,8 @@ constexpr size_t kMostInCell = LSP_CELL_MAX_REFERENCES - 1;
 CellGrid build_cell_grid(std::span<const LspTriangle> triangles, const Box& bounds, uint32_t longest);
 
 // With as many cells as the scene wants: about kWantedCells of them filled, or as many as it has triangles
-// for, and more where a cell would be too full, up to some kMostCells: throws as above where that does not
-// help.
-CellGrid choose_cell_grid(std::span<const LspTriangle> triangles, const Box& bounds);
+// for, no more than `most`, and more only where a cell would be too full, up to some kMostCells: throws as
+// above where that does not help.
+CellGrid choose_cell_grid(std::span<const LspTriangle> triangles, const Box& bounds, size_t most);
 
 }  // namespace lsp

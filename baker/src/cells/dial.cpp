@@ -17,7 +17,7 @@ constexpr double kRadii[] = {0.067, 0.2};  // of ambient occlusion, in diagonals
 
 // A ray costs this much besides its look-ups: steps through the grid are cheap, exact traces dear (H200,
 // lavapipe).
-constexpr double kLookUp = 2, kExact = 3, kExactNode = 0.5, kTriangle = 1;
+constexpr double kLookUp = 2, kExact = 3, kExactNode = 0.5, kTriangle = 1, kWideNode = 2.8;
 
 // What a point of the dial errs.
 struct DialError {
@@ -31,6 +31,7 @@ struct DialError {
 struct Rays {
   std::vector<LspRay> rays;  // kPerPoint of each point, one after the other
   std::vector<LspHit> truth;
+  double cost = 0;  // of an exact ray
 };
 
 std::vector<LspHit> trace(const lsp_scene& scene, const lsp_trace_options& options,
@@ -77,8 +78,22 @@ class Dial {
     for (const LspTriangle& t : baked.triangles) material_[t.primitive] = t.material;
     sets_[0].rays = surface_rays(baked, kPoints, kPerPoint);
     sets_[1].rays = seen_rays(baked, kPoints, kPerPoint);
-    lsp_trace_counts ignored{};
-    for (Rays& set : sets_) set.truth = trace(scene_, {0, 0, 0, 0}, set.rays, &ignored);
+    for (Rays& set : sets_) {
+      lsp_trace_counts counts{};
+      set.truth = trace(scene_, {0, 0, 0, 0}, set.rays, &counts);
+      set.cost = (kWideNode * double(counts.nodes) + kTriangle * double(counts.triangles)) /
+                 double(std::max<size_t>(1, set.rays.size()));
+    }
+  }
+
+  // Of the quality "balanced", and of exact rays: the mean over both kinds of rays.
+  RayCost cost() const {
+    RayCost sum;
+    for (const Rays& set : sets_) {
+      sum.cells += measure(set).cost / double(sets_.size());
+      sum.exact += set.cost / double(sets_.size());
+    }
+    return sum;
   }
 
   // The cheapest dial that keeps within errors, or the finest. The more of the origin tables is heeded, the
@@ -186,14 +201,15 @@ class Dial {
 
 }  // namespace
 
-void choose_dial(Baked& baked, double wrong) {
+RayCost choose_dial(Baked& baked, double wrong) {
   LspHeader& h = baked.header;
   for (uint32_t& dial : h.quality) dial = LSP_DIAL_TABLES;
-  if (baked.cell_tables.references.empty()) return;
+  if (baked.cell_tables.references.empty()) return {};
   Dial dial(baked);
   const uint32_t accurate = dial.cheapest(0.5 * wrong);
   h.quality[LSP_QUALITY_BALANCED] = dial.cheapest(wrong);
   h.quality[LSP_QUALITY_ACCURATE] = accurate;
+  return dial.cost();
 }
 
 }  // namespace lsp

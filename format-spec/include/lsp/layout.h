@@ -37,7 +37,7 @@ typedef struct lsp_float3 {
 
 /* Version of the format (not of the programs). A reader refuses another major version. */
 #define LSP_VERSION_MAJOR 2u
-#define LSP_VERSION_MINOR 3u
+#define LSP_VERSION_MINOR 4u
 
 /* First eight bytes: 89 'L' 'S' 'P' 0D 0A 1A 0A, as two little-endian words. Catches text-mode transfers. */
 #define LSP_MAGIC_0 0x50534C89u
@@ -55,16 +55,19 @@ typedef struct lsp_float3 {
 #define LSP_FEATURE_CELLS 0x40u      /* approximate rays are answered by cells */
 #define LSP_FEATURE_COVERAGE 0x80u   /* some triangle is there in part: LSP_TRIANGLE_GAPS_SHIFT */
 #define LSP_FEATURE_WIDE 0x100u      /* exact rays walk wide nodes (WNOD); there is no NODE then */
-#define LSP_FEATURES_KNOWN 0x1FFu
+#define LSP_FEATURE_WIDE_BASE 0x200u /* the base structure is the wide nodes alone: there are no tables */
+#define LSP_FEATURES_KNOWN 0x3FFu
 
 /* Base structures. */
 #define LSP_BASE_BVH 1u
 #define LSP_BASE_NTREE 2u
 #define LSP_BASE_CELLS 3u /* cells, and for exact rays wide nodes, or (before 2.3) a BVH */
+#define LSP_BASE_WIDE 4u  /* wide nodes alone: every ray is answered exactly */
 
 #ifndef GL_core_profile
 /* The minor version to write: the lowest that knows these required features. */
 static inline uint32_t lsp_version_minor(uint32_t required_features) {
+  if ((required_features & LSP_FEATURE_WIDE_BASE) != 0) return 4u;
   if ((required_features & LSP_FEATURE_WIDE) != 0) return 3u;
   return (required_features & LSP_FEATURE_COVERAGE) != 0 ? 1u : 0u;
 }

@@ -57,12 +57,14 @@ constexpr int kind_of(uint32_t type) {
 
 constexpr bool is_ntree(const LspHeader& h) { return h.base_structure == LSP_BASE_NTREE; }
 constexpr bool has_cells(const LspHeader& h) { return h.base_structure == LSP_BASE_CELLS; }
+constexpr bool is_wide(const LspHeader& h) { return h.base_structure == LSP_BASE_WIDE; }
 
 // Whether a file with this header may have sections of `base`; one of unknown base is read as a BVH. One of
-// cells written before 2.3 has a BVH besides.
+// cells has the tree for exact rays besides: wide nodes, before 2.3 a BVH.
 constexpr bool holds_base(const LspHeader& h, uint32_t base) {
   if (base == LSP_BASE_CELLS) return has_cells(h);
-  return base == 0 || base == (is_ntree(h) ? LSP_BASE_NTREE : LSP_BASE_BVH);
+  if (base == LSP_BASE_WIDE) return has_cells(h) || is_wide(h);
+  return base == 0 || (!is_wide(h) && base == (is_ntree(h) ? LSP_BASE_NTREE : LSP_BASE_BVH));
 }
 
 // How many elements the header says that a section has, whether its feature asks for it or not; nothing for

@@ -57,9 +57,6 @@ typedef struct lsp_vulkan_limits {
       max_buffer_size; /* VkPhysicalDeviceMaintenance4Properties::maxBufferSize; 0: the device does not say */
 } lsp_vulkan_limits;
 
-/* What the shader has to be made for besides the base structures of files: wide nodes, LSP_FEATURE_WIDE. */
-#define LSP_BASE_WIDE 4u
-
 /* One buffer of the scene: file bytes [file_offset, file_offset + bytes) as they are. */
 typedef struct lsp_vulkan_buffer {
   uint32_t binding; /* LSP_BINDING_* */
@@ -75,8 +72,9 @@ typedef struct lsp_vulkan_plan {
   uint64_t bytes;           /* of all buffers together */
   VkBufferUsageFlags usage; /* of every buffer; an imported one can do without the transfer bit */
   uint32_t addresses; /* nonzero: the sections are read through addresses, see lsp_vulkan_address_table */
-  uint32_t base_structure;  /* LSP_BASE_*: the shader has to be made for it */
-  uint32_t exact_structure; /* the same of exact rays alone: of cells LSP_BASE_WIDE, or LSP_BASE_BVH */
+  uint32_t base_structure; /* LSP_BASE_*: the shader has to be made for it */
+  uint32_t
+      exact_structure; /* the same of exact rays alone: of cells LSP_BASE_WIDE, before 2.3 LSP_BASE_BVH */
 } lsp_vulkan_plan;
 
 /* Usage of every buffer of a plan without addresses. */

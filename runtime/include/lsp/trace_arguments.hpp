@@ -64,13 +64,15 @@ inline lsp_trace_options to_trace_options(const TraceArguments& a, bool approxim
 inline std::vector<std::string> unused_arguments(const TraceArguments& a, bool approximate,
                                                  const LspHeader& header) {
   const bool cells = (header.required_features & LSP_FEATURE_CELLS) != 0;
+  const bool tables = cells || (header.required_features & LSP_FEATURE_LINE_SPACES) != 0;
   std::vector<std::string> notes;
   const auto note = [&](bool given, const char* option, bool cells_have_it) {
     if (!given || (approximate && cells == cells_have_it)) return;
     notes.push_back(std::string(option) + " does nothing: " +
                     (!approximate ? "rays are exact"
                      : cells      ? "the file has cells, see --quality"
-                                  : "the file has no cells"));
+                     : tables     ? "the file has no cells"
+                                  : "the file has no tables, every ray is answered exactly"));
   };
   note(a.near != "exact", "--near", false);
   note(a.lod > 0, "--lod", false);
