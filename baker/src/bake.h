@@ -50,9 +50,10 @@ struct BakeOptions {
       folder;  // where Line Spaces that the limit has no room for go meanwhile; empty: nowhere
 };
 
-// What a ray costs, in steps through the grid: answered by cells at the quality "balanced", and exactly.
-struct RayCost {
-  double cells = 0, exact = 0;
+// How many times as fast as exact rays those are that cells answer at the quality "balanced", by what they
+// count: an estimate.
+struct Gain {
+  double vulkan = 0, cpu = 0;
 };
 
 // The sections of a file, and the header but for what the writer knows (sizes, offsets, hashes).
@@ -68,7 +69,7 @@ struct Baked {
   std::vector<LspMaterial> materials;     // empty: no section
   LineSpaces line_spaces;
   std::vector<std::string> skipped;  // what the scene did not need, in words
-  RayCost cost;
+  Gain gain;                         // of cells with exact data
   double tree_seconds = 0;
   double line_space_seconds = 0;
 };

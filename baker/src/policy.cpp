@@ -142,8 +142,8 @@ uint64_t table_bytes(const Baked& baked) {
 Chosen bake_weighed(const Mesh& mesh, Arguments& a, const Progress& progress) {
   constexpr double kTableShare = 3;  // of the exact data
   constexpr uint64_t kPadding =
-      8 << 12;                    // about: of the eight sections of tables, and what is stated of them
-  constexpr double kWorth = 0.9;  // of the time of an exact ray
+      8 << 12;                           // about: of the eight sections of tables, and what is stated of them
+  constexpr Gain kWorth = {1.05, 0.97};  // at least, of both
   constexpr int kBakes = 3;
   BakeOptions options = bake_options(a);
   options.table_share = kTableShare;
@@ -158,7 +158,7 @@ Chosen bake_weighed(const Mesh& mesh, Arguments& a, const Progress& progress) {
       if (options.cells > 0 && bakes < kBakes) continue;
       leave_out_tables(chosen.baked,
                        "of so small a mesh, they would be more than three times its exact data");
-    } else if (chosen.baked.cost.cells > kWorth * chosen.baked.cost.exact) {
+    } else if (chosen.baked.gain.vulkan < kWorth.vulkan || chosen.baked.gain.cpu < kWorth.cpu) {
       leave_out_tables(chosen.baked, "a ray through them would take as long as an exact one");
     } else {
       chosen.error = measure_error(chosen.baked, kErrorRays);

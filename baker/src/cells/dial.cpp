@@ -15,9 +15,30 @@ constexpr uint32_t kPoints = 2048;         // of either kind
 constexpr uint32_t kPerPoint = 16;         // rays
 constexpr double kRadii[] = {0.067, 0.2};  // of ambient occlusion, in diagonals
 
-// A ray costs this much besides its look-ups: steps through the grid are cheap, exact traces dear (H200,
-// lavapipe).
-constexpr double kLookUp = 2, kExact = 3, kExactNode = 0.5, kTriangle = 1, kWideNode = 2.8;
+// What the parts of a ray cost, all in the same unit.
+struct Costs {
+  double step, look_up, call, cell_node, cell_triangle;
+  double wide_node, triangle, exact_ray;
+
+  double cells(const lsp_trace_counts& c) const {
+    return (step * double(c.nodes) + look_up * double(c.shafts) + call * double(c.exact) +
+            cell_node * double(c.exact_nodes) + cell_triangle * double(c.triangles)) /
+           double(std::max<uint64_t>(1, c.rays));
+  }
+  double exact(const lsp_trace_counts& c) const {
+    return exact_ray + (wide_node * double(c.nodes) + triangle * double(c.triangles)) /
+                           double(std::max<uint64_t>(1, c.rays));
+  }
+};
+// Fitted to the times of thirty meshes of 50 to 330,000 triangles, most of them within a fifth. Steps through
+// the grid are cheap, exact traces dear.
+constexpr Costs kVulkan = {1, 2, 3, 0.5, 1, 2.8, 1, 0};  // lavapipe, H200
+
+// On the CPU exact rays wait for memory, the more there is of it.
+Costs cpu_costs(uint64_t exact_bytes) {
+  const double doublings = std::log2(std::max(1.0, double(exact_bytes) * 1e-6));
+  return {0.5, 1, 0.8, 1, 0.9, 1.1 + 0.125 * std::min(4.0, doublings), 0.6, 0.5};
+}
 
 // What a point of the dial errs.
 struct DialError {
@@ -25,13 +46,13 @@ struct DialError {
   double depth = 0;    // mean error of the distance where both hit, in diagonals
   double picture = 0;  // of ambient occlusion, over its mean or 0.25: the worse of a short and a long radius
   double light = 0;    // of the light that comes back to a point, over its mean
-  double cost = 0;     // of a ray: steps, look-ups and exact traces
+  lsp_trace_counts counts{};
 };
 
 struct Rays {
   std::vector<LspRay> rays;  // kPerPoint of each point, one after the other
   std::vector<LspHit> truth;
-  double cost = 0;  // of an exact ray
+  lsp_trace_counts counts{};  // of exact rays
 };
 
 std::vector<LspHit> trace(const lsp_scene& scene, const lsp_trace_options& options,
@@ -69,7 +90,10 @@ struct Measured {
 class Dial {
  public:
   explicit Dial(Baked& baked)
-      : header_(baked.header), scene_(view(baked)), diagonal_(diagonal(baked.header)) {
+      : header_(baked.header),
+        scene_(view(baked)),
+        diagonal_(diagonal(baked.header)),
+        exact_bytes_(exact_bytes(baked)) {
     for (const LspMaterial& m : baked.materials) {
       const glm::vec3 color = vec(m.base_color) + vec(m.emission);
       brightness_.push_back((color.x + color.y + color.z) / 3);
@@ -78,22 +102,20 @@ class Dial {
     for (const LspTriangle& t : baked.triangles) material_[t.primitive] = t.material;
     sets_[0].rays = surface_rays(baked, kPoints, kPerPoint);
     sets_[1].rays = seen_rays(baked, kPoints, kPerPoint);
-    for (Rays& set : sets_) {
-      lsp_trace_counts counts{};
-      set.truth = trace(scene_, {0, 0, 0, 0}, set.rays, &counts);
-      set.cost = (kWideNode * double(counts.nodes) + kTriangle * double(counts.triangles)) /
-                 double(std::max<size_t>(1, set.rays.size()));
-    }
+    for (Rays& set : sets_) set.truth = trace(scene_, {0, 0, 0, 0}, set.rays, &set.counts);
   }
 
-  // Of the quality "balanced", and of exact rays: the mean over both kinds of rays.
-  RayCost cost() const {
-    RayCost sum;
+  // Of the quality "balanced", over both kinds of rays.
+  Gain gain() const {
+    lsp_trace_counts cells{}, exact{};
     for (const Rays& set : sets_) {
-      sum.cells += measure(set).cost / double(sets_.size());
-      sum.exact += set.cost / double(sets_.size());
+      const DialError error = measure(set);
+      lsp_add_counts(&cells, &error.counts);
+      lsp_add_counts(&exact, &set.counts);
     }
-    return sum;
+    if (cells.rays == 0) return {};
+    const Costs cpu = cpu_costs(exact_bytes_);
+    return {kVulkan.exact(exact) / kVulkan.cells(cells), cpu.exact(exact) / cpu.cells(cells)};
   }
 
   // The cheapest dial that keeps within errors, or the finest. The more of the origin tables is heeded, the
@@ -110,7 +132,7 @@ class Dial {
       bool kept = true;
       for (const Rays& set : sets_) {
         const DialError error = measure(set);
-        cost = std::max(cost, error.cost);
+        cost = std::max(cost, kVulkan.cells(error.counts));
         kept = kept && within(error, wrong);
         if (!kept) break;
       }
@@ -156,9 +178,8 @@ class Dial {
   }
 
   DialError measure(const Rays& set) const {
-    lsp_trace_counts counts{};
-    const std::vector<LspHit> hits = trace(scene_, {LSP_TRACE_APPROXIMATE, 0, 0, 0}, set.rays, &counts);
     DialError error;
+    const std::vector<LspHit> hits = trace(scene_, {LSP_TRACE_APPROXIMATE, 0, 0, 0}, set.rays, &error.counts);
     size_t wrong = 0, both = 0;
     double depth = 0;
     for (size_t i = 0; i < hits.size(); ++i) {
@@ -185,15 +206,13 @@ class Dial {
                   light_at(&set.rays[p], &hits[p], p / kPerPoint));
       error.light = light.truth > 0 ? light.off / light.truth : 0;
     }
-    error.cost = (double(counts.nodes) + kLookUp * double(counts.shafts) + kExact * double(counts.exact) +
-                  kExactNode * double(counts.exact_nodes) + kTriangle * double(counts.triangles)) /
-                 rays;
     return error;
   }
 
   LspHeader& header_;
   const lsp_scene scene_;
   const double diagonal_;
+  const uint64_t exact_bytes_;
   std::vector<float> brightness_;   // by material; empty: light does not count
   std::vector<uint32_t> material_;  // by primitive
   std::array<Rays, 2> sets_;
@@ -201,7 +220,7 @@ class Dial {
 
 }  // namespace
 
-RayCost choose_dial(Baked& baked, double wrong) {
+Gain choose_dial(Baked& baked, double wrong) {
   LspHeader& h = baked.header;
   for (uint32_t& dial : h.quality) dial = LSP_DIAL_TABLES;
   if (baked.cell_tables.references.empty()) return {};
@@ -209,7 +228,7 @@ RayCost choose_dial(Baked& baked, double wrong) {
   const uint32_t accurate = dial.cheapest(0.5 * wrong);
   h.quality[LSP_QUALITY_BALANCED] = dial.cheapest(wrong);
   h.quality[LSP_QUALITY_ACCURATE] = accurate;
-  return dial.cost();
+  return dial.gain();
 }
 
 }  // namespace lsp

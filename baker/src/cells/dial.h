@@ -9,7 +9,7 @@ namespace lsp {
 // writes header.quality: fast answers from tables alone, balanced errs at most `wrong` (a share) of the rays,
 // as much in depth, three times as much in ambient occlusion and four times as much in the light that
 // surfaces send back, accurate half of that; each is the cheapest dial that does, or the finest. Returns what
-// rays cost then; nothing without exact data.
-RayCost choose_dial(Baked& baked, double wrong);
+// balanced gains; nothing without exact data.
+Gain choose_dial(Baked& baked, double wrong);
 
 }  // namespace lsp
