@@ -2,11 +2,11 @@
 //
 // Of Highway headers alone are used: what its library holds is the choice of a target, made with the
 // functions below. The targets are these, and the one without vectors that Highway wants to have. Under
-// sanitizers, with which each takes minutes to compile, one stands for all: they are the same text.
+// sanitizers and without optimisation, where each takes long to compile, one stands for all: the same text.
 #pragma once
 
 #define HWY_IS_DEBUG_BUILD 0
-#ifdef LSP_ONE_SIMD_TARGET
+#if defined(LSP_INSTRUMENTED) || !defined(__OPTIMIZE__)
 #define HWY_DISABLED_TARGETS (~(HWY_AVX2 | HWY_NEON | HWY_EMU128 | HWY_SCALAR))
 #else
 #define HWY_DISABLED_TARGETS (~(HWY_AVX3 | HWY_AVX2 | HWY_SSE4 | HWY_NEON | HWY_EMU128 | HWY_SCALAR))

@@ -12,8 +12,8 @@
 
 #include "lsp/lsp.h"
 
-#ifdef __SANITIZE_ADDRESS__
-#define LSP_INLINE  // inlined and instrumented, the loops take minutes to compile
+#if defined(LSP_INSTRUMENTED) || defined(__SANITIZE_ADDRESS__) || !defined(__OPTIMIZE__)
+#define LSP_INLINE  // inlined and instrumented, or not optimised, the loops take long to compile
 #else
 #define LSP_INLINE __attribute__((always_inline))
 #endif

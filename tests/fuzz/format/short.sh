@@ -26,7 +26,7 @@ if command -v ccache >/dev/null; then
   launcher=(-DCMAKE_C_COMPILER_LAUNCHER=ccache -DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
 fi
 cmake -S "$source" -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo -DCMAKE_CXX_COMPILER="$clang" \
-  -DCMAKE_CXX_FLAGS_RELWITHDEBINFO='-O1 -gline-tables-only' -DLSP_SIMD=OFF \
+  -DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O1 -DLSP_SIMD=OFF \
   -DCMAKE_C_COMPILER="${clang/clang++/clang}" "${launcher[@]}" >"$build/configure.log" 2>&1 ||
   { tail -20 "$build/configure.log"; exit 4; }
 cmake --build "$build" --target fuzz_format >"$build/build.log" 2>&1 || { tail -40 "$build/build.log"; exit 4; }
