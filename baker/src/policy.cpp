@@ -138,35 +138,46 @@ uint64_t table_bytes(const Baked& baked) {
   return bytes;
 }
 
+// Cells whose tables take at most three times the exact data, on the finest grid of which this is so, or
+// nearly. False: there is none, `baked` has more.
+bool bake_small_tables(const Mesh& mesh, BakeOptions options, const Progress& progress, Baked& baked) {
+  constexpr double kTableShare = 3;
+  constexpr uint64_t kPadding =
+      8 << 12;  // about: of the eight sections of tables, and what is stated of them
+  constexpr int kBakes = 3;
+  options.table_share = kTableShare;
+  baked = bake(mesh, options, progress);
+  for (int bakes = 1;; ++bakes) {
+    const double most = kTableShare * double(exact_bytes(baked));
+    const double tables = double(table_bytes(baked) + kPadding);
+    if (tables <= most) return true;
+    const double longest = longest_side(baked.header.cells);
+    options.cells = uint32_t(longest * std::min(std::sqrt(most / tables), 1 - 1 / longest));
+    if (options.cells == 0 || bakes == kBakes || baked.cell_grid.crowded) return false;
+    try {
+      baked = bake(mesh, options, progress);
+    } catch (const Failure& failure) {
+      if (failure.exit() != Exit::kLimit) throw;
+      return false;  // a cell of that grid would hold too many triangles
+    }
+  }
+}
+
 // Cells as fine as they are worth their bytes; none where a ray through them takes as long as an exact one.
 Chosen bake_weighed(const Mesh& mesh, Arguments& a, const Progress& progress) {
-  constexpr double kTableShare = 3;  // of the exact data
-  constexpr uint64_t kPadding =
-      8 << 12;                           // about: of the eight sections of tables, and what is stated of them
   constexpr Gain kWorth = {1.05, 0.97};  // at least, of both
-  constexpr int kBakes = 3;
-  BakeOptions options = bake_options(a);
-  options.table_share = kTableShare;
-  for (int bakes = 1;; ++bakes) {
-    Chosen chosen;
-    chosen.baked = bake(mesh, options, progress);
-    const double most = kTableShare * double(exact_bytes(chosen.baked));
-    const double tables = double(table_bytes(chosen.baked) + kPadding);
-    if (tables > most) {
-      const double longest = longest_side(chosen.baked.header.cells);
-      options.cells = uint32_t(longest * std::min(std::sqrt(most / tables), 1 - 1 / longest));
-      if (options.cells > 0 && bakes < kBakes) continue;
-      leave_out_tables(chosen.baked,
-                       "of so small a mesh, they would be more than three times its exact data");
-    } else if (chosen.baked.gain.vulkan < kWorth.vulkan || chosen.baked.gain.cpu < kWorth.cpu) {
-      leave_out_tables(chosen.baked, "a ray through them would take as long as an exact one");
-    } else {
-      chosen.error = measure_error(chosen.baked, kErrorRays);
-      return chosen;
-    }
-    a.base = "wide";
+  Chosen chosen;
+  Baked& baked = chosen.baked;
+  if (!bake_small_tables(mesh, bake_options(a), progress, baked)) {
+    leave_out_tables(baked, "of so small a mesh, they would be more than three times its exact data");
+  } else if (baked.gain.vulkan < kWorth.vulkan || baked.gain.cpu < kWorth.cpu) {
+    leave_out_tables(baked, "a ray through them would take as long as an exact one");
+  } else {
+    chosen.error = measure_error(baked, kErrorRays);
     return chosen;
   }
+  a.base = "wide";
+  return chosen;
 }
 
 void leave_out_exact(Baked& baked, bool cells) {

@@ -172,6 +172,7 @@ CellGrid choose_cell_grid(std::span<const LspTriangle> triangles, const Box& bou
   while (longest < LSP_MAX_CELLS && grid.words.size() < kMostCells && fullest(grid) > kMostInCell) {
     longest = std::min(longest + longest / 16 + 1, LSP_MAX_CELLS);
     grid = sort_into_cells(triangles, bounds, longest);
+    grid.crowded = true;
   }
   return finish(std::move(grid));
 }

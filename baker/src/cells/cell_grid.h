@@ -24,6 +24,7 @@ struct CellGrid {
   glm::vec3 lo{0};  // lower corner of cell (0, 0, 0), world space
   float size = 1;   // edge of a cell
   glm::ivec3 dims{0};
+  bool crowded = false;         // finer than the scene wants, for the sake of its fullest cell
   float margin = 0;             // a cell also holds what comes within this distance of it
   std::vector<uint32_t> words;  // of every cell, see LspCell: LSP_CELL_FILLED | index, or its jump
   std::vector<Cell> cells;      // filled ones, in the order of the grid
