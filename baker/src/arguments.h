@@ -17,7 +17,8 @@ constexpr uint32_t kNTreeLevels = 3;
 struct Arguments {
   std::vector<std::filesystem::path> inputs;
   std::filesystem::path output;
-  std::string base;  // empty: cells, or what the options given belong to
+  bool instances = false;  // the output is a scene, .json
+  std::string base;        // empty: cells, or what the options given belong to
   uint32_t cells = 0;
   uint32_t branching = 0;  // 0: the resolution
   uint32_t levels = kNTreeLevels;
