@@ -17,6 +17,7 @@ constexpr uint32_t kNTreeLevels = 3;
 struct Arguments {
   std::vector<std::filesystem::path> inputs;
   std::filesystem::path output;
+  bool instances = false;     // the output is a scene, .json
   std::string base;           // empty: cells, or what the options given belong to
   bool weigh_tables = false;  // cells, but only as fine as they are worth it
   uint32_t cells = 0;

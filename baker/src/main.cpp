@@ -1,51 +1,21 @@
-// lsp-bake: turns meshes into an .lsp file.
+// lsp-bake: turns meshes into an .lsp file, or into several and a scene of them.
 #include <tbb/global_control.h>
 
-#include <chrono>
-#include <cstdio>
 #include <iostream>
 #include <map>
+#include <memory>
 #include <nlohmann/json.hpp>
 
-#include "color_materials.h"
-#include "import/import.h"
-#include "import/source_file.h"
+#include "bake_file.h"
+#include "bake_scene.h"
 #include "lsp/command_line.h"
-#include "policy.h"
 #include "provenance.h"
 #include "report.h"
-#include "writer.h"
+#include "timer.h"
 
 namespace {
 
 using namespace lsp;
-using Json = nlohmann::ordered_json;
-
-// Seconds since it was made or asked before.
-class Timer {
- public:
-  double operator()() {
-    const auto now = std::chrono::steady_clock::now();
-    return std::chrono::duration<double>(now - std::exchange(start_, now)).count();
-  }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
-
-std::vector<std::string> names_of(const std::vector<Material>& materials) {
-  std::vector<std::string> names;
-  for (const Material& material : materials) names.push_back(material.name);
-  return names;
-}
-
-// --strict: what is not read, or not as it stands, is an error.
-[[noreturn]] void refuse_notes(const Mesh& mesh) {
-  for (const std::string& note : mesh.notes) std::fprintf(stderr, "lsp-bake: note: %s\n", note.c_str());
-  throw Failure(Exit::kInvalid, mesh.sources.front().front().string(),
-                "led to " + std::to_string(mesh.notes.size()) +
-                    " notes, which --strict refuses: mend the input or leave out --strict");
-}
 
 // Before the work: a bake takes seconds to minutes.
 void check_folder(const std::filesystem::path& output) {
@@ -55,6 +25,28 @@ void check_folder(const std::filesystem::path& output) {
                   "cannot be written: there is no folder " + folder.string() + ", make it or choose another");
 }
 
+void bake_one(Arguments& a, ProgressBar& bar) {
+  Timer timer;
+  bar.show("import", 0);
+  Mesh mesh = import_meshes(a.inputs, import_options(a));
+  if (a.strict) refuse_notes(mesh.notes, a);
+  const auto source = hash_sources(mesh);
+  const double import_seconds = timer();
+
+  const FileBake done = bake_file(mesh, a, source, nullptr,
+                                  [&](std::string_view stage, double share) { bar.show(stage, share); });
+  done.file->commit();
+  if (!a.depfile.empty()) write_depfile(a, mesh.sources);
+  bar.clear();
+
+  const BakeReport report = {
+      a, mesh, done.chosen.baked, done.chosen.error, done.written, import_seconds, done.write_seconds};
+  if (a.common.json)
+    std::cout << report_json(report, done.meta).dump(2) << "\n";
+  else if (!a.common.quiet)
+    print_report(report);
+}
+
 Exit run(Arguments a) {
   settle(a);
   check_folder(a.output);
@@ -62,45 +54,10 @@ Exit run(Arguments a) {
   if (a.threads)
     control = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism, a.threads);
   ProgressBar bar(!a.common.quiet && !a.common.json);
-  Timer timer;
-
-  bar.show("import", 0);
-  ImportOptions import_options;
-  import_options.memory_limit = a.memory_limit;
-  import_options.crease_angle_degrees = a.crease_angle;
-  import_options.time = a.time;
-  import_options.animation = a.animation;
-  Mesh mesh = import_meshes(a.inputs, import_options);
-  if (a.strict && !mesh.notes.empty()) refuse_notes(mesh);
-  const auto source = hash_sources(mesh);
-  const std::vector<std::string> material_names = names_of(mesh.materials);
-  make_color_materials(mesh);
-  const double import_seconds = timer();
-
-  const WriteOptions write_options = {a.align, a.compress == "zstd", 12, a.memory_limit};
-  const auto meta_of = [&](const Chosen& c) {
-    return provenance(a, c.baked, mesh, material_names, source, c.error);
-  };
-  Chosen chosen = bake_as_asked(
-      mesh, a, [&](std::string_view stage, double done) { bar.show(stage, done); },
-      [&](Chosen& c) { return lsp_bytes(c.baked, meta_of(c).dump(), write_options); });
-  auto& [baked, error] = chosen;
-  baked.header.source_hash_lo = source[0];
-  baked.header.source_hash_hi = source[1];
-  timer();
-
-  bar.show("write", 0);
-  const Json meta = meta_of(chosen);
-  const Written written = write_lsp(a.output, baked, meta.dump(), write_options);
-  if (!a.depfile.empty()) write_depfile(a, mesh);
-  const double write_seconds = timer();
-  bar.clear();
-
-  const BakeReport report = {a, mesh, baked, error, written, import_seconds, write_seconds};
-  if (a.common.json)
-    std::cout << report_json(report, meta).dump(2) << "\n";
-  else if (!a.common.quiet)
-    print_report(report);
+  if (a.instances)
+    bake_scene(a, bar);
+  else
+    bake_one(a, bar);
   return Exit::kDone;
 }
 
@@ -108,10 +65,16 @@ Exit run(Arguments a) {
 
 int main(int argc, char** argv) {
   Arguments a;
-  CLI::App app("Bakes meshes (.gltf .glb .obj .ply .stl .off) into an .lsp file.", "lsp-bake");
+  CLI::App app("Bakes meshes (.gltf .glb .obj .ply .stl .off) into an .lsp file, or several.", "lsp-bake");
   app.option_defaults()->always_capture_default();
   app.add_option("INPUT", a.inputs, "Mesh files, read in this order")->required();
-  app.add_option("-o,--output", a.output, "The .lsp file to write")->required();
+  app.add_option("-o,--output", a.output, "The .lsp file to write; with --instances the scene, .json")
+      ->required();
+  app.add_flag(
+      "--instances", a.instances,
+      "Bake every mesh of glTF scenes once, however often nodes place it, to NAME.MESH.lsp beside -o "
+      "NAME.json, the scene with all places; every other file is one asset and one instance. All "
+      "options hold for each asset");
   app.add_option(
          "--base", a.base,
          "Base structure: cells, answered from tables and traced exactly where these lose; a tree with "
@@ -134,7 +97,9 @@ int main(int argc, char** argv) {
                  "cells the point of the dial; 0: as --preset says")
       ->check(CLI::Range(0.0, 100.0));
   app.add_option("--max-size", a.max_size,
-                 "The longest file, as 20MB: where it would be longer, a coarser grid of cells; 0: any")
+                 "The longest file, as 20MB: where it would be longer, a coarser grid of cells; 0: any. With "
+                 "--instances "
+                 "of each asset")
       ->transform(CLI::AsSizeValue(true));
   auto* resolution =
       app.add_option("--resolution", a.resolution, "N: patches along an edge of a Line Space's box")
@@ -189,13 +154,14 @@ int main(int argc, char** argv) {
       ->needs(time);
   app.add_flag("--strict", a.strict, "Refuse, with exit 3, an input that leads to any note");
   app.add_option("--depfile", a.depfile,
-                 "Write a rule for Make and Ninja: OUT.lsp: every file that was read");
+                 "Write a rule for Make and Ninja: OUT.lsp (or NAME.json): every file that was read");
   app.add_flag("--no-splits", a.no_splits, "Build the tree without spatial splits");
   add_common_options(app, "lsp-bake", a.common);
   arrange_help(
       app, "lsp-bake room.gltf -o room.lsp --preset fast",
       {{"What most people need",
-        {"INPUT", "--output FILE", "--preset", "--max-error PERCENT", "--max-size", "--for", "--compress"}},
+        {"INPUT", "--output FILE", "--preset", "--max-error PERCENT", "--max-size", "--for", "--compress",
+         "--instances"}},
        {"Base structure", {"--base", "--cells", "--branching", "--levels", "--no-splits"}},
        {"Line Spaces",
         {"--resolution", "--depth", "--triangles", "--samples", "--normal-angle DEGREES", "--plane-tolerance",

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "cells/dial.h"
+#include "import/text.h"
 #include "lsp/program.h"
 
 namespace lsp {
@@ -42,6 +43,13 @@ std::string base_of(const Arguments& a) {
 
 // Throws where options contradict each other.
 void check(const Arguments& a) {
+  const bool scene = equals_ignoring_case(a.output.extension().string(), ".json");
+  if (a.instances && !scene)
+    throw Failure(Exit::kUsage, a.output.string(),
+                  "is no scene, which --instances writes: give -o NAME.json");
+  if (scene && !a.instances)
+    throw Failure(Exit::kUsage, a.output.string(),
+                  "is the name of a scene: add --instances to write one, or give -o NAME.lsp");
   if (a.exact && a.no_exact) throw Failure(Exit::kUsage, "", "--exact and --no-exact exclude each other");
   if (a.max_error > 0 && (a.resolution_given || a.depth_given || a.samples_given))
     throw Failure(Exit::kUsage, "",

@@ -39,7 +39,7 @@ std::string hex128(uint64_t lo, uint64_t hi) {
   return text;
 }
 
-void write_depfile(const Arguments& a, const Mesh& mesh) {
+void write_depfile(const Arguments& a, const std::vector<std::vector<std::filesystem::path>>& sources) {
   const auto escaped = [](const std::filesystem::path& path) {
     std::string text;
     for (const char c : path.string()) {
@@ -50,7 +50,7 @@ void write_depfile(const Arguments& a, const Mesh& mesh) {
     return text;
   };
   std::string rule = escaped(a.output) + ":";
-  for (const auto& files : mesh.sources) {
+  for (const auto& files : sources) {
     for (const auto& file : files) rule += " \\\n  " + escaped(file);
   }
   write_text(a.depfile, rule + "\n");

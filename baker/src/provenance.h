@@ -14,8 +14,8 @@ nlohmann::ordered_json provenance(const Arguments& a, const Baked& baked, const 
                                   const std::vector<std::string>& material_names,
                                   const std::array<uint64_t, 2>& source, const MeasuredError& error);
 
-// A rule for Make and Ninja: the output depends on every file that was read.
-void write_depfile(const Arguments& a, const Mesh& mesh);
+// A rule for Make and Ninja: the output depends on every file that was read, `sources` as Mesh has them.
+void write_depfile(const Arguments& a, const std::vector<std::vector<std::filesystem::path>>& sources);
 
 // A hash of 128 bits in hexadecimal digits.
 std::string hex128(uint64_t lo, uint64_t hi);

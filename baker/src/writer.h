@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "bake.h"
+#include "temporary_file.h"
 
 namespace lsp {
 
@@ -34,6 +35,9 @@ struct Written {
 // Exit::kLimit.
 Written write_lsp(const std::filesystem::path& path, Baked& baked, const std::string& meta,
                   const WriteOptions& options);
+
+// The same into a file that has its name only when it is committed, which is left to the caller.
+Written write_lsp(TemporaryFile& file, Baked& baked, const std::string& meta, const WriteOptions& options);
 
 // How long that file will be, in bytes. Completes `baked.header`, too; packs where `options` say so.
 uint64_t lsp_bytes(Baked& baked, const std::string& meta, const WriteOptions& options);

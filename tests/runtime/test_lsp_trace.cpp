@@ -232,6 +232,7 @@ TEST_F(LspTrace, FaultsOfASceneAreNamedByPlace) {
       {R"({"lsp_scene": 1, "assets": {}})", 3, "/assets: "},
       {R"({"lsp_scene": 1, "assets": []})", 3, "/instances: is missing"},
       {R"({"lsp_scene": 1, "asets": []})", 3, "/asets: is not known"},
+      {R"({"lsp_scene": 1, "origin": [1, 2], "assets": [], "instances": []})", 3, "/origin: "},
       {scene(good, "5"), 3, "/assets/0: "},
       {scene(good, "\"gone.lsp\""), 2, "/assets/0: gone.lsp: "},
       {scene(good, "\"rays.bin\""), 3, "/assets/0: rays.bin: "},

@@ -1,10 +1,14 @@
 // glTF scenes: nodes, instances, skins, materials.
+#include <algorithm>
+#include <bit>
 #include <limits>
+#include <map>
 
 #include "import/gltf_materials.h"
 #include "import/gltf_primitive.h"
 #include "import/gltf_skin.h"
 #include "import/readers.h"
+#include "import/source_file.h"
 #include "lsp/program.h"
 
 namespace lsp {
@@ -13,10 +17,28 @@ namespace {
 // Nodes a scene may visit, shared ones counted each time: seconds, and no more.
 constexpr uint64_t kMaxVisits = 1 << 24;
 
+// Whether an instance may have the matrix. Harder to please than the runtime (lsp_instances_build), which has
+// it in single precision: another factor of two.
+bool has_inverse(const glm::dmat4& matrix) {
+  double columns = 1;
+  glm::dmat3 linear(matrix);
+  for (int i = 0; i < 4; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      if (!std::isfinite(float(matrix[i][k]))) return false;
+      if (i < 3) linear[i][k] = double(float(matrix[i][k]));
+    }
+    if (i < 3) columns *= glm::length(linear[i]);
+  }
+  const double determinant = glm::determinant(linear);
+  return std::abs(determinant) > columns * 0x1p-39 && std::isfinite(1 / determinant);
+}
+
+// Reads into one mesh or, where `instances` is not null, into the assets and instances there.
 class GltfReader {
  public:
-  GltfReader(const std::filesystem::path& path, MeshBuilder& builder)
+  GltfReader(const std::filesystem::path& path, MeshBuilder& builder, InstancedMeshes* instances)
       : builder_(builder),
+        instances_(instances),
         document_(read_gltf_document(path, builder.budget())),
         model_(document_->model),
         accessors_(*document_, builder.budget()),
@@ -108,7 +130,7 @@ class GltfReader {
     if (all.visits > kMaxVisits) {
       throw Failure(Exit::kLimit, document_->file, "places more than 2^24 nodes, split the scene");
     }
-    builder_.check_count(document_->file, all.triangles);
+    if (!instances_) builder_.check_count(document_->file, all.triangles);
   }
 
   static void add(Extent& to, const Extent& more) {
@@ -165,13 +187,8 @@ class GltfReader {
   }
 
   void place_all(int node, const glm::dmat4& world) {
-    const std::vector<GltfPrimitive>& list = primitives(node);
     const tinygltf::Value* attributes = instancing(node);
-    const int skin = model_.nodes[size_t(node)].skin;
-    if (!attributes) {
-      for (const GltfPrimitive& primitive : list) place(primitive, world, skin);
-      return;
-    }
+    if (!attributes) return place_mesh(node, world);
     const auto read = [&](const char* name, int components) {
       const tinygltf::Value& accessor = attributes->Get(name);
       return accessor.IsInt() ? accessors_.floats(accessor.Get<int>(), components) : std::vector<float>();
@@ -186,12 +203,70 @@ class GltfReader {
     const uint64_t count = instances(node);
     for (uint64_t i = 0; i < count; ++i) {
       const glm::dmat4 own = gltf_matrix(slice(translation, i, 3), slice(rotation, i, 4), slice(scale, i, 3));
-      for (const GltfPrimitive& primitive : list) place(primitive, world * own, skin);
+      place_mesh(node, world * own);
     }
   }
 
+  void place_mesh(int node, const glm::dmat4& world) {
+    if (instances_) return add_instance(node, world);
+    for (const GltfPrimitive& primitive : primitives(node))
+      place(primitive, world, model_.nodes[size_t(node)].skin, builder_, primitive.material);
+  }
+
+  // What makes meshes distinct: the mesh as its weights have it, and, where an asset is in scene space, the
+  // skin that moves it and the matrix, by its bits.
+  struct AssetKey {
+    const std::vector<GltfPrimitive>* primitives;
+    int skin = -1;
+    std::array<uint64_t, 16> matrix{};
+    auto operator<=>(const AssetKey&) const = default;
+  };
+
+  void add_instance(int node, const glm::dmat4& world) {
+    const std::vector<GltfPrimitive>& list = primitives(node);
+    if (list.empty()) return;
+    const int skin = model_.nodes[size_t(node)].skin;
+    const auto posed = std::count_if(list.begin(), list.end(),
+                                     [&](const GltfPrimitive& p) { return skin >= 0 && p.joints_each; });
+    const bool in_scene_space = posed > 0 || !has_inverse(world);
+    AssetKey key{&list, posed > 0 ? skin : -1, {}};
+    if (in_scene_space && posed < std::ptrdiff_t(list.size()))
+      key.matrix = std::bit_cast<std::array<uint64_t, 16>>(world);
+    const auto [at, fresh] = assets_.try_emplace(key, kNoIndex);
+    const glm::dmat4 none(1);
+    if (fresh) at->second = make_asset(node, in_scene_space ? world : none);
+    const std::string& name = model_.nodes[size_t(node)].name;
+    if (at->second == kNoIndex)
+      return builder_.note(document_->file + ": instances of the mesh " + mesh_name(node) +
+                           " are left out, none of its triangles can be used" +
+                           (in_scene_space ? " where the node " + name + " puts it" : ""));
+    if (instances_->instances.size() == kMaxInstances)
+      throw Failure(Exit::kLimit, document_->file, "places more than 2^24 - 1 meshes, split the scene");
+    builder_.budget().charge(document_->file, name.size());
+    builder_.budget().push_back(document_->file, instances_->instances,
+                                {at->second, in_scene_space ? none : world, printable(name)});
+  }
+
+  std::string mesh_name(int node) const {
+    const int mesh = model_.nodes[size_t(node)].mesh;
+    const std::string& name = model_.meshes[size_t(mesh)].name;
+    return name.empty() ? "mesh" + std::to_string(mesh) : name;
+  }
+
+  uint32_t make_asset(int node, const glm::dmat4& matrix) {
+    MeshBuilder asset(builder_.budget(), 0);
+    std::map<uint32_t, uint32_t> materials;  // from the builder's to those of the asset
+    for (const GltfPrimitive& primitive : primitives(node)) {
+      const auto [at, fresh] = materials.try_emplace(primitive.material, 0);
+      if (fresh) at->second = asset.add_material(builder_.mesh().materials[primitive.material]);
+      place(primitive, matrix, model_.nodes[size_t(node)].skin, asset, at->second);
+    }
+    return add_asset(*instances_, asset, mesh_name(node), true);
+  }
+
   // A primitive as its node places it, or, where it has joints, as these do.
-  void place(const GltfPrimitive& primitive, const glm::dmat4& world, int skin) {
+  void place(const GltfPrimitive& primitive, const glm::dmat4& world, int skin, MeshBuilder& to,
+             uint32_t material) {
     placed_.resize(primitive.positions.size());
     turned_.resize(primitive.normals.size());
     mirrored_.clear();
@@ -205,7 +280,7 @@ class GltfReader {
       for (size_t i = 0; i < turned_.size(); ++i) turned_[i] = placement.normal(primitive.normals[i]);
     }
 
-    builder_.begin(document_->file, placed_, primitive.indices.size() / 3, MissingNormals::kFlat);
+    to.begin(document_->file, placed_, primitive.indices.size() / 3, MissingNormals::kFlat);
     for (size_t i = 0; i + 2 < primitive.indices.size(); i += 3) {
       glm::uvec3 corners(primitive.indices[i], primitive.indices[i + 1], primitive.indices[i + 2]);
       const size_t first = corners.x;
@@ -214,10 +289,10 @@ class GltfReader {
       const bool has_normals =
           corners.x < turned_.size() && corners.y < turned_.size() && corners.z < turned_.size();
       for (int k = 0; k < 3 && has_normals; ++k) normals[k] = turned_[corners[k]];
-      builder_.add(corners, has_normals ? normals : nullptr, primitive.material,
-                   primitive.colors.empty() ? nullptr : &primitive.colors[i / 3]);
+      to.add(corners, has_normals ? normals : nullptr, material,
+             primitive.colors.empty() ? nullptr : &primitive.colors[i / 3]);
     }
-    builder_.end();
+    to.end();
   }
 
   void place_by_joints(const GltfPrimitive& primitive, const std::vector<glm::dmat4>& joints) {
@@ -233,6 +308,8 @@ class GltfReader {
   }
 
   MeshBuilder& builder_;
+  InstancedMeshes* const instances_;
+  std::map<AssetKey, uint32_t> assets_;  // their numbers; kNoIndex: nothing of it can be baked
   const std::unique_ptr<GltfDocument> document_;
   const tinygltf::Model& model_;
   GltfAccessors accessors_;
@@ -249,7 +326,14 @@ class GltfReader {
 }  // namespace
 
 void read_gltf(const std::filesystem::path& path, MeshBuilder& builder, PoseRequest& pose) {
-  GltfReader(path, builder).read(pose);
+  GltfReader(path, builder, nullptr).read(pose);
+}
+
+void read_gltf_instances(const std::filesystem::path& path, MeshBuilder& builder, PoseRequest& pose,
+                         InstancedMeshes& to) {
+  GltfReader(path, builder, &to).read(pose);
+  to.sources.back() = builder.mesh().sources.back();
+  to.notes.insert(to.notes.end(), builder.mesh().notes.begin(), builder.mesh().notes.end());
 }
 
 }  // namespace lsp

@@ -100,7 +100,8 @@ json reduce_document(const json& from) {
   });
   reduce_list(from, to, "nodes", [](const json& item) {
     json out = json::object();
-    copy(item, out, {"mesh", "children", "matrix", "translation", "rotation", "scale", "skin", "weights"});
+    copy(item, out,
+         {"name", "mesh", "children", "matrix", "translation", "rotation", "scale", "skin", "weights"});
     json extensions = reduce_extensions(item, {"EXT_mesh_gpu_instancing"});
     if (!extensions.empty()) out["extensions"] = std::move(extensions);
     return out;

@@ -20,9 +20,16 @@ std::string extension_of(const std::filesystem::path& path) {
   return extension;
 }
 
-void read_mesh_file(const std::filesystem::path& path, MeshBuilder& builder, PoseRequest& pose) {
+}  // namespace
+
+bool is_gltf(const std::filesystem::path& path) {
   const std::string extension = extension_of(path);
-  if (extension == ".gltf" || extension == ".glb") return read_gltf(path, builder, pose);
+  return extension == ".gltf" || extension == ".glb";
+}
+
+void read_mesh_file(const std::filesystem::path& path, MeshBuilder& builder, PoseRequest& pose) {
+  if (is_gltf(path)) return read_gltf(path, builder, pose);
+  const std::string extension = extension_of(path);
   if (extension == ".obj") return read_obj(path, builder);
   if (extension == ".ply") return read_ply(path, builder);
   if (extension == ".stl") return read_stl(path, builder);
@@ -31,7 +38,6 @@ void read_mesh_file(const std::filesystem::path& path, MeshBuilder& builder, Pos
                 "is of no format known here, give .gltf, .glb, .obj, .ply, .stl or .off");
 }
 
-// A time that moves nothing is a mistake.
 void check_pose(const PoseRequest& pose) {
   if (!pose.seconds || pose.met) return;
   if (pose.known.empty()) throw Failure(Exit::kUsage, "", "no input has an animation, leave out --time");
@@ -40,7 +46,18 @@ void check_pose(const PoseRequest& pose) {
   throw Failure(Exit::kUsage, "", "no input has the animation " + pose.animation + ", choose of " + names);
 }
 
-}  // namespace
+void refuse_input(const std::filesystem::path& path, uint64_t count, const Rejected& before,
+                  const Rejected& after) {
+  if (count == 0)
+    throw Failure(Exit::kInvalid, path.string(), "holds no triangle, give a file with a mesh in it");
+  const std::string why = "none of its " + std::to_string(count) + " triangles can be used (" +
+                          std::to_string(after.degenerate - before.degenerate) + " degenerate, " +
+                          std::to_string(after.non_finite - before.non_finite) + " not finite, " +
+                          std::to_string(after.out_of_range - before.out_of_range) +
+                          " with indices out of range, " +
+                          std::to_string(after.invisible - before.invisible) + " wholly transparent)";
+  throw Failure(Exit::kInvalid, path.string(), why + ", repair or leave out the file");
+}
 
 Mesh import_meshes(std::span<const std::filesystem::path> inputs, const ImportOptions& options) {
   Budget budget(options.memory_limit);
@@ -57,19 +74,8 @@ Mesh import_meshes(std::span<const std::filesystem::path> inputs, const ImportOp
     }
     budget.settle(builder.allocated_bytes());
     const uint64_t count = builder.mesh().primitive_count - count_before;
-    if (count == 0) {
-      throw Failure(Exit::kInvalid, path.string(), "holds no triangle, give a file with a mesh in it");
-    }
     const Rejected& rejected = builder.mesh().rejected;
-    if (count == rejected.total() - before.total()) {
-      const std::string why = "none of its " + std::to_string(count) + " triangles can be used (" +
-                              std::to_string(rejected.degenerate - before.degenerate) + " degenerate, " +
-                              std::to_string(rejected.non_finite - before.non_finite) + " not finite, " +
-                              std::to_string(rejected.out_of_range - before.out_of_range) +
-                              " with indices out of range, " +
-                              std::to_string(rejected.invisible - before.invisible) + " wholly transparent)";
-      throw Failure(Exit::kInvalid, path.string(), why + ", repair or leave out the file");
-    }
+    if (count == rejected.total() - before.total()) refuse_input(path, count, before, rejected);
   }
   check_pose(pose);
   return builder.take();

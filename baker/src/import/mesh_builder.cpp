@@ -294,7 +294,9 @@ void MeshBuilder::note(const std::string& text) {
 
 Mesh MeshBuilder::take() {
   if (mesh_.materials.empty()) default_material();
-  mesh_.origin = choose_origin(exact_);
+  OriginChooser chooser;
+  for (const glm::dvec3& position : exact_) chooser.add(position);
+  mesh_.origin = chooser.origin();
   round_positions(exact_, mesh_);
   const Rejected& rejected = mesh_.rejected;
   const std::pair<uint64_t, const char*> left_out[] = {

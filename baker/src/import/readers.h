@@ -21,6 +21,7 @@
 #include <filesystem>
 
 #include "import/gltf_animation.h"
+#include "import/instances.h"
 #include "import/mesh_builder.h"
 
 namespace lsp {
@@ -31,5 +32,18 @@ void read_stl(const std::filesystem::path& path, MeshBuilder& builder);
 void read_off(const std::filesystem::path& path, MeshBuilder& builder);
 // .gltf and .glb, at rest or in the pose that is asked for.
 void read_gltf(const std::filesystem::path& path, MeshBuilder& builder, PoseRequest& pose);
+// The same as assets and instances; the builder has the file's notes, materials and what it led to.
+void read_gltf_instances(const std::filesystem::path& path, MeshBuilder& builder, PoseRequest& pose,
+                         InstancedMeshes& to);
+
+// What import_meshes and import_instances share.
+bool is_gltf(const std::filesystem::path& path);
+// By the file's extension.
+void read_mesh_file(const std::filesystem::path& path, MeshBuilder& builder, PoseRequest& pose);
+// Throws Failure kUsage for a time that moves nothing: a mistake.
+void check_pose(const PoseRequest& pose);
+// Throws Failure kInvalid, saying why nothing can be made of the input's `count` triangles.
+[[noreturn]] void refuse_input(const std::filesystem::path& path, uint64_t count, const Rejected& before,
+                               const Rejected& after);
 
 }  // namespace lsp

@@ -103,20 +103,19 @@ uint64_t hash_key() {
 
 [[gnu::noinline]] glm::vec3 rounded(const glm::dvec3& p) { return glm::vec3(p); }
 
-glm::dvec3 choose_origin(const std::vector<glm::dvec3>& exact) {
-  if (exact.empty()) return glm::dvec3(0);
-  glm::dvec3 low = exact[0], high = exact[0];
-  double moved = 0;
-  for (const glm::dvec3& p : exact) {
-    low = glm::min(low, p);
-    high = glm::max(high, p);
-    moved = std::max(moved, largest(p - glm::dvec3(rounded(p))));
-  }
-  const double size = largest(high - low);
-  if (moved <= kTolerance * size) return glm::dvec3(0);
+void OriginChooser::add(const glm::dvec3& position) {
+  low_ = any_ ? glm::min(low_, position) : position;
+  high_ = any_ ? glm::max(high_, position) : position;
+  moved_ = std::max(moved_, largest(position - glm::dvec3(rounded(position))));
+  any_ = true;
+}
+
+glm::dvec3 OriginChooser::origin() const {
+  const double size = largest(high_ - low_);
+  if (moved_ <= kTolerance * size) return glm::dvec3(0);
   // A step of a 16th of the size or so: differences to such an origin are exact, and it is a short number.
   const double step = std::exp2(std::floor(std::log2(size)) - 4);
-  return glm::round((low + (high - low) * 0.5) / step) * step;
+  return glm::round((low_ + (high_ - low_) * 0.5) / step) * step;
 }
 
 void round_positions(const std::vector<glm::dvec3>& exact, Mesh& mesh) {

@@ -16,9 +16,19 @@ glm::vec3 rounded(const glm::dvec3& p);
 // What hashes of positions are keyed with: whoever writes a mesh cannot know which of them collide.
 uint64_t hash_key();
 
-// Zero, unless rounding to float32 would move a position by more than 1e-6 of the scene's longest side: then
-// the middle of the scene, rounded to a step that positions near it have in double precision too.
-glm::dvec3 choose_origin(const std::vector<glm::dvec3>& exact);
+// Where a scene's origin should be, of all positions that it is told of: zero, unless rounding to float32
+// would move one by more than 1e-6 of the scene's longest side; then the middle of the scene, rounded to a
+// step that positions near it have in double precision too.
+class OriginChooser {
+ public:
+  void add(const glm::dvec3& position);
+  glm::dvec3 origin() const;
+
+ private:
+  bool any_ = false;
+  glm::dvec3 low_{0}, high_{0};
+  double moved_ = 0;
+};
 
 // Fills mesh.positions with `exact` less mesh.origin, welds what became equal, and takes out triangles that
 // have no area any more (counted as collapsed).

@@ -3,9 +3,13 @@
 //
 //   {"lsp_scene": 1, "assets": ["duck.lsp", ...],
 //    "instances": [{"asset": 0, "transform": [12 numbers: three rows of four], "mask": 255, "user": 7}, ...]}
+//
+// It may have a "name", instances too, and an "origin" [x, y, z]: what it was made from, rays and hits are
+// relative to it, as with an .lsp file that has one.
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <filesystem>
 #include <fstream>
@@ -41,7 +45,8 @@ class InstancedScene {
     if (version != 1)
       throw Failure(Exit::kUnsupported, path_,
                     "/lsp_scene: is " + version.dump() + ", this program reads 1; use a newer one");
-    only(json, "", {"lsp_scene", "assets", "instances", "name"});
+    only(json, "", {"lsp_scene", "assets", "instances", "name", "origin"});
+    read_origin(json);
     open_assets(json, memory_limit);
     read_instances(json);
     build();
@@ -50,6 +55,8 @@ class InstancedScene {
   const std::vector<std::unique_ptr<SceneFile>>& assets() const { return assets_; }
   const std::vector<std::string>& asset_paths() const { return asset_paths_; }
   const Instances& instances() const { return instances_; }
+  // What the scene's space, its rays and hits are relative to, in the space of what it was made from.
+  const std::array<double, 3>& origin() const { return origin_; }
 
  private:
   using Json = nlohmann::json;
@@ -139,6 +146,15 @@ class InstancedScene {
     }
   }
 
+  void read_origin(const Json& json) {
+    const auto found = json.find("origin");
+    if (found == json.end()) return;
+    const auto number = [](const Json& value) { return value.is_number(); };
+    if (!found->is_array() || found->size() != 3 || !std::all_of(found->begin(), found->end(), number))
+      fail("/origin", "is not an array of three numbers; write x, y and z or leave it out");
+    for (size_t i = 0; i < 3; ++i) origin_[i] = (*found)[i].get<double>();
+  }
+
   void read_transform(const Json& numbers, const std::string& place, lsp_instance& instance) const {
     if (!numbers.is_array() || numbers.size() != 12)
       fail(place, "is not an array of 12 numbers; write three rows of four");
@@ -173,6 +189,7 @@ class InstancedScene {
   }
 
   std::string path_;
+  std::array<double, 3> origin_{};
   std::vector<std::unique_ptr<SceneFile>> assets_;
   std::vector<std::string> asset_paths_;
   std::vector<lsp_instance> places_;

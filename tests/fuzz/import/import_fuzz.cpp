@@ -11,7 +11,8 @@
 #include <optional>
 #include <string_view>
 
-#include "import/import.h"
+#include "import/instances.h"
+#include "import/readers.h"
 #include "lsp/program.h"
 
 namespace {
@@ -41,6 +42,16 @@ void check(const lsp::Mesh& mesh) {
   }
 }
 
+void check(const lsp::InstancedMeshes& scene) {
+  for (const lsp::InstancedAsset& asset : scene.assets) check(asset.mesh);
+  for (const lsp::MeshInstance& instance : scene.instances) {
+    require(instance.asset < scene.assets.size(), "asset out of range");
+    for (int k = 0; k < 16; ++k) {
+      require(std::isfinite(instance.transform[k / 4][k % 4]), "transform not finite");
+    }
+  }
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
@@ -56,7 +67,9 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     if (posed && !animated) break;
     try {
       const std::optional<double> time = posed ? std::optional(0.5) : std::nullopt;
-      check(lsp::import_meshes({&path, 1}, {.memory_limit = 256 << 20, .time = time}));
+      const lsp::ImportOptions options = {.memory_limit = 256 << 20, .time = time};
+      if (lsp::is_gltf(path)) check(lsp::import_instances({&path, 1}, options));
+      check(lsp::import_meshes({&path, 1}, options));
     } catch (const lsp::Failure& failure) {
       require(failure.exit() != lsp::Exit::kInternal && failure.what()[0] != '\0',
               "failure without a reason");
