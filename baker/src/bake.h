@@ -40,6 +40,7 @@ struct BakeOptions {
   LineSpaceOptions line_space;
   uint32_t cells = 0;  // along the longest side of the grid; 0: chosen from the scene
   CellTableOptions cell_tables;
+  bool finish = true;         // false: without what needs the tables of all cells, as the dial does
   double cells_wrong = 0.01;  // share of the rays that the quality "balanced" may answer wrongly, see dial.h
   float plane_tolerance = 0.0f;         // LspHeader.plane_tolerance
   float normal_angle_degrees = 180.0f;  // LspHeader.normal_angle_cos; 180: no hit is rejected

@@ -83,7 +83,7 @@ void fill_cells(BakeJob& job) {
                                        baked.materials, options, job.stage("cells"));
   set_cells(baked.cell_grid, baked.cell_tables, options, baked.header);
   const size_t cells = baked.cell_grid.words.size();
-  baked.skipped.push_back("empty cells: " + with_commas(cells - baked.cell_tables.cells.size()) + " of " +
+  baked.skipped.push_back("empty cells: " + with_commas(cells - baked.cell_grid.cells.size()) + " of " +
                           with_commas(cells));
 }
 

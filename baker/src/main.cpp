@@ -1,7 +1,6 @@
 // lsp-bake: turns meshes into an .lsp file.
 #include <tbb/global_control.h>
 
-#include <chrono>
 #include <cstdio>
 #include <iostream>
 #include <map>
@@ -14,24 +13,15 @@
 #include "policy.h"
 #include "provenance.h"
 #include "report.h"
+#include "shard/write_shard.h"
+#include "temporary_file.h"
+#include "timer.h"
 #include "writer.h"
 
 namespace {
 
 using namespace lsp;
 using Json = nlohmann::ordered_json;
-
-// Seconds since it was made or asked before.
-class Timer {
- public:
-  double operator()() {
-    const auto now = std::chrono::steady_clock::now();
-    return std::chrono::duration<double>(now - std::exchange(start_, now)).count();
-  }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 std::vector<std::string> names_of(const std::vector<Material>& materials) {
   std::vector<std::string> names;
@@ -45,14 +35,6 @@ std::vector<std::string> names_of(const std::vector<Material>& materials) {
   throw Failure(Exit::kInvalid, mesh.sources.front().front().string(),
                 "led to " + std::to_string(mesh.notes.size()) +
                     " notes, which --strict refuses: mend the input or leave out --strict");
-}
-
-// Before the work: a bake takes seconds to minutes.
-void check_folder(const std::filesystem::path& output) {
-  const std::filesystem::path folder = output.has_parent_path() ? output.parent_path() : ".";
-  if (!std::filesystem::is_directory(folder))
-    throw Failure(Exit::kFile, output.string(),
-                  "cannot be written: there is no folder " + folder.string() + ", make it or choose another");
 }
 
 Exit run(Arguments a) {
@@ -78,6 +60,12 @@ Exit run(Arguments a) {
   const double import_seconds = timer();
 
   const WriteOptions write_options = {a.align, a.compress == "zstd", 12, a.memory_limit};
+  if (!a.shard.empty()) {
+    write_shard(a, {mesh, material_names, source, import_seconds}, write_options,
+                [&](std::string_view stage, double done) { bar.show(stage, done); });
+    if (!a.depfile.empty()) write_depfile(a, mesh);
+    return Exit::kDone;
+  }
   const auto meta_of = [&](const Chosen& c) {
     return provenance(a, c.baked, mesh, material_names, source, c.error);
   };
@@ -189,6 +177,9 @@ int main(int argc, char** argv) {
   app.add_flag("--strict", a.strict, "Refuse, with exit 3, an input that leads to any note");
   app.add_option("--depfile", a.depfile,
                  "Write a rule for Make and Ninja: OUT.lsp: every file that was read");
+  app.add_option(
+      "--shard", a.shard,
+      "Bake share I of K of the cells, and write it as a part that lsp-merge joins with the others");
   app.add_flag("--no-splits", a.no_splits, "Build the tree without spatial splits");
   add_common_options(app, "lsp-bake", a.common);
   arrange_help(
@@ -201,7 +192,7 @@ int main(int argc, char** argv) {
          "--no-line-spaces", "--exact", "--no-exact"}},
        {"What is read",
         {"--time SECONDS", "--animation NAME", "--crease-angle DEGREES", "--strict", "--depfile FILE"}},
-       {"The machine and the file", {"--threads", "--memory-limit", "--align"}}});
+       {"The machine and the file", {"--threads", "--memory-limit", "--align", "--shard I/K"}}});
   return run_program("lsp-bake", app, argc, argv, [&] {
     a.resolution_given = resolution->count() > 0;
     a.depth_given = depth->count() > 0;

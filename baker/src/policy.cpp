@@ -6,7 +6,7 @@
 #include <map>
 #include <optional>
 
-#include "cells/dial.h"
+#include "accuracy.h"
 #include "lsp/program.h"
 
 namespace lsp {
@@ -24,7 +24,6 @@ const std::map<std::string, Preset> kPresets = {
     {"fast", {{4, 8, 3}, 24, 8}}, {"balanced", {{6, 9, 5}, 64, 24}}, {"accurate", {{6, 11, 9}, 128, 72}}};
 // From cheap to dear, for --max-error.
 const std::vector<Quality> kLadder = {{4, 7, 5}, {4, 9, 5}, {6, 9, 5}, {6, 11, 9}, {8, 11, 9}, {8, 13, 9}};
-constexpr uint64_t kErrorRays = 65536;
 const std::map<std::string, Base> kBases = {
     {"bvh", Base::kBvh}, {"ntree", Base::kNTree}, {"cells", Base::kCells}};
 
@@ -62,6 +61,13 @@ void check(const Arguments& a) {
     throw Failure(Exit::kUsage, "", "--time is no number of seconds, give one");
   if (ntree && a.max_error > 0)
     throw Failure(Exit::kUsage, "", "--max-error chooses among cells or BVHs: leave out --base ntree");
+  if (!a.shard.empty() && !cells)
+    throw Failure(Exit::kUsage, "",
+                  "--shard divides the cells of --base cells: leave out --base " + a.base +
+                      " and what is of Line Spaces, or bake in one, without --shard");
+  if (!a.shard.empty() && a.max_size)
+    throw Failure(Exit::kUsage, "",
+                  "--max-size needs the whole bake, which no --shard has: choose the grid by --cells");
   if (a.no_line_spaces && a.no_exact)
     throw Failure(Exit::kUsage, "", "--no-line-spaces with --no-exact leaves nothing to trace");
 }
@@ -72,6 +78,7 @@ BakeOptions bake_options(const Arguments& a) {
   options.line_spaces = !a.no_line_spaces;
   options.base = kBases.at(a.base);
   options.cells = a.cells;
+  options.cells_wrong = accuracy_of(a).wrong;
   const Preset& preset = kPresets.at(a.preset);
   options.cell_tables.far_samples = preset.far_samples;
   options.cell_tables.origin_samples = preset.origin_samples;
@@ -109,18 +116,9 @@ Chosen climb(const Mesh& mesh, Arguments& a, const Progress& progress) {
 
 // Cells whose dial keeps the error where one was asked for, if any point of it does.
 Chosen bake_cells(const Mesh& mesh, const Arguments& a, const Progress& progress) {
-  BakeOptions options = bake_options(a);
-  if (a.max_error > 0) options.cells_wrong = a.max_error / 100;
   Chosen chosen;
-  chosen.baked = bake(mesh, options, progress);
-  chosen.error = measure_error(chosen.baked, kErrorRays);
-  // The dial is measured on rays of its own: what they flattered is asked for again, more sternly, and in
-  // the end everything is traced exactly.
-  for (const double part : {0.7, 0.5, 0.3, 0.0}) {
-    if (a.max_error == 0 || 100 * chosen.error.wrong_share() <= a.max_error) break;
-    choose_dial(chosen.baked, part * options.cells_wrong);
-    chosen.error = measure_error(chosen.baked, kErrorRays);
-  }
+  chosen.baked = bake(mesh, bake_options(a), progress);
+  chosen.error = settle_dial(chosen.baked, accuracy_of(a));
   return chosen;
 }
 
@@ -147,15 +145,7 @@ Chosen bake_accurately(const Mesh& mesh, Arguments& a, const Progress& progress)
     if (!a.no_line_spaces && a.purpose != Purpose::kVisibility)
       chosen.error = measure_error(chosen.baked, kErrorRays);
   }
-  if (a.max_error > 0 && 100 * chosen.error.wrong_share() > a.max_error) {
-    char text[160];
-    std::snprintf(
-        text, sizeof text,
-        "the most accurate setting still answers %.3f %% of rays wrongly, over --max-error %g: allow more, "
-        "or trace exactly",
-        100 * chosen.error.wrong_share(), a.max_error);
-    throw Failure(Exit::kLimit, a.inputs[0].string(), text);
-  }
+  check_error(chosen.error, a.max_error, a.inputs[0].string());
   if (a.no_exact) leave_out_exact(chosen.baked, cells);
   return chosen;
 }
@@ -223,6 +213,7 @@ Chosen bake_within(const Mesh& mesh, Arguments& a, const Progress& progress, con
 void settle(Arguments& a) {
   a.base = base_of(a);
   check(a);
+  if (!a.shard.empty()) parse_shard(a.shard);
   const Preset& preset = kPresets.at(a.preset);
   const bool ntree = a.base == "ntree";
   if (!a.resolution_given) a.resolution = preset.line_spaces.resolution;
@@ -231,6 +222,20 @@ void settle(Arguments& a) {
   // 142 MB.
   if (!a.depth_given) a.depths = {ntree ? std::min(a.levels - 1, 1u) : preset.line_spaces.depth};
   if (!a.samples_given) a.samples = preset.line_spaces.samples;
+}
+
+Accuracy accuracy_of(const Arguments& a) {
+  Accuracy accuracy;
+  accuracy.max_error = a.max_error;
+  if (a.max_error > 0) accuracy.wrong = a.max_error / 100;
+  return accuracy;
+}
+
+Baked bake_shard(const Mesh& mesh, const Arguments& a, const Shard& shard, const Progress& progress) {
+  BakeOptions options = bake_options(a);
+  options.cell_tables.shard = shard;
+  options.finish = false;
+  return bake(mesh, options, progress);
 }
 
 Chosen bake_as_asked(const Mesh& mesh, Arguments& a, const Progress& progress, const FileSize& file_size) {

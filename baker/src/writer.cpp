@@ -1,13 +1,9 @@
 #include "writer.h"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
 #include <xxhash.h>
 #include <zstd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cstring>
 #include <functional>
 #include <memory>
@@ -15,6 +11,7 @@
 
 #include "lsp/program.h"
 #include "lsp/sections.h"
+#include "temporary_file.h"
 
 namespace lsp {
 namespace {
@@ -68,65 +65,6 @@ struct ContentEntry {
   uint64_t element_count, bytes, hash_lo, hash_hi;
 };
 static_assert(sizeof(ContentEntry) == 40);
-
-// A file under a temporary name until commit().
-class TemporaryFile {
- public:
-  explicit TemporaryFile(const std::filesystem::path& path) : path_(path), temporary_(path) {
-    temporary_ += ".XXXXXX";
-    std::string name = temporary_.string();
-    fd_ = mkstemp(name.data());
-    temporary_ = name;
-    if (fd_ < 0) fail("cannot write here");
-    fchmod_default();
-  }
-  ~TemporaryFile() {
-    if (fd_ >= 0) {
-      close(fd_);
-      unlink(temporary_.c_str());
-    }
-  }
-  TemporaryFile(const TemporaryFile&) = delete;
-  TemporaryFile& operator=(const TemporaryFile&) = delete;
-
-  void write(const void* data, size_t size) {
-    const char* p = static_cast<const char*>(data);
-    while (size > 0) {
-      const ssize_t n = ::write(fd_, p, size);
-      if (n < 0 && errno == EINTR) continue;
-      if (n <= 0) fail("cannot write");
-      p += n;
-      size -= size_t(n);
-      position_ += uint64_t(n);
-    }
-  }
-  void pad_to(uint64_t position) {
-    static const char zeros[4096] = {};
-    while (position_ < position) write(zeros, size_t(std::min<uint64_t>(sizeof zeros, position - position_)));
-  }
-  void commit() {
-    if (fsync(fd_) != 0) fail("cannot write");
-    if (rename(temporary_.c_str(), path_.c_str()) != 0) fail("cannot replace the file");
-    close(fd_);
-    fd_ = -1;
-  }
-
- private:
-  void fchmod_default() {
-    const mode_t mask = umask(0);
-    umask(mask);
-    (void)!fchmod(fd_, 0666 & ~mask);
-  }
-  [[noreturn]] void fail(const char* what) {
-    throw Failure(
-        Exit::kFile, path_.string(),
-        std::string(what) + ": " + std::strerror(errno) + "; give another place with -o or make room");
-  }
-
-  std::filesystem::path path_, temporary_;
-  int fd_ = -1;
-  uint64_t position_ = 0;
-};
 
 // All that are not empty; they point into `baked` and `meta`.
 std::vector<Section> sections_of(const Baked& baked, const std::string& meta) {

@@ -1,0 +1,33 @@
+#include "accuracy.h"
+
+#include <cstdio>
+
+#include "cells/dial.h"
+#include "lsp/program.h"
+
+namespace lsp {
+
+MeasuredError settle_dial(Baked& baked, const Accuracy& asked) {
+  MeasuredError error = measure_error(baked, kErrorRays);
+  // The dial is measured on rays of its own: what they flattered is asked for again, more sternly, and in
+  // the end everything is traced exactly.
+  for (const double part : {0.7, 0.5, 0.3, 0.0}) {
+    if (asked.max_error == 0 || 100 * error.wrong_share() <= asked.max_error) break;
+    choose_dial(baked, part * asked.wrong);
+    error = measure_error(baked, kErrorRays);
+  }
+  return error;
+}
+
+void check_error(const MeasuredError& error, double max_error, const std::string& file) {
+  if (max_error == 0 || 100 * error.wrong_share() <= max_error) return;
+  char text[160];
+  std::snprintf(
+      text, sizeof text,
+      "the most accurate setting still answers %.3f %% of rays wrongly, over --max-error %g: allow more, "
+      "or trace exactly",
+      100 * error.wrong_share(), max_error);
+  throw Failure(Exit::kLimit, file, text);
+}
+
+}  // namespace lsp

@@ -1,0 +1,25 @@
+// Whether a bake errs no more than was asked for, and what is done about it where cells err more.
+#pragma once
+
+#include <string>
+
+#include "error.h"
+
+namespace lsp {
+
+constexpr uint64_t kErrorRays = 65536;
+
+// What is asked of a bake of cells.
+struct Accuracy {
+  double wrong = 0.01;   // share of the rays that the dial is measured for, see dial.h
+  double max_error = 0;  // per cent of the rays, 0: not asked for
+};
+
+// Measures the error of cells whose dial is chosen for `asked`. Where they err more, the dial becomes
+// sterner.
+MeasuredError settle_dial(Baked& baked, const Accuracy& asked);
+
+// Throws Failure with Exit::kLimit, naming `file`, where the error is above `max_error` per cent.
+void check_error(const MeasuredError& error, double max_error, const std::string& file);
+
+}  // namespace lsp
