@@ -44,6 +44,7 @@ struct Arguments {
   std::string preset = "balanced";
   uint64_t max_size = 0;  // of the file, bytes; 0: none
   double max_error = 0;   // per cent of rays, 0: not asked for
+  std::string shard;      // "I/K", empty: the whole bake
   bool strict = false;
   std::filesystem::path depfile;
   bool resolution_given = false, depth_given = false, samples_given = false;

@@ -10,7 +10,6 @@
 
 #include "base_structure.h"
 #include "lsp/program.h"
-#include "lsp/sections.h"
 #include "normals.h"
 #include "vectors.h"
 
@@ -135,45 +134,6 @@ void plan_memory(const Mesh& mesh, BakeOptions& options) {
 
 }  // namespace
 
-std::string with_commas(uint64_t n) {
-  std::string reversed;
-  do {
-    if (reversed.size() % 4 == 3) reversed += ',';
-    reversed += char('0' + n % 10);
-    n /= 10;
-  } while (n);
-  return {reversed.rbegin(), reversed.rend()};
-}
-
-lsp_scene view(const Baked& baked) {
-  const SectionArrays arrays{baked};
-  lsp_scene scene{};
-  scene.header = &baked.header;
-#define LSP_ARRAY_SECTION(Name, TYPE, code, Element, flag, base, feature, owed, member, ...) \
-  scene.member = arrays.member.size() == 0 ? nullptr : arrays.member.data();
-#include "lsp/sections.def"
-  return scene;
-}
-
-uint64_t exact_bytes(const Baked& baked) {
-  return baked.triangles.size() * sizeof(LspTriangle) + baked.normals.size() * sizeof(LspCornerNormals) +
-         baked.materials.size() * sizeof(LspMaterial) + baked.wide.nodes.size() * sizeof(LspWideNode);
-}
-
-void set_counts(Baked& baked) {
-  LspHeader& h = baked.header;
-  format::set_counters(h, SectionArrays{baked});
-  const bool partial = std::any_of(baked.triangles.begin(), baked.triangles.end(), has_gaps);
-  h.required_features = (h.required_features & ~LSP_FEATURE_COVERAGE) | (partial ? LSP_FEATURE_COVERAGE : 0);
-  if (!format::is_ntree(h)) return;
-  const uint64_t steps = lsp_ntree_steps(&h);
-  if (steps > LSP_NONE)
-    throw Failure(Exit::kLimit, "",
-                  "the NTree needs " + with_commas(steps) +
-                      " steps of traversal, more than a file can state: lower --levels");
-  h.max_steps = uint32_t(steps);
-}
-
 Baked bake(const Mesh& mesh, const BakeOptions& asked, const Progress& progress) {
   BakeOptions options = asked;
   plan_memory(mesh, options);
@@ -219,7 +179,7 @@ Baked bake(const Mesh& mesh, const BakeOptions& asked, const Progress& progress)
 
   baked.header.required_features = features_of(baked) | base.feature;
   set_counts(baked);
-  if (base.finish) base.finish(job);
+  if (base.finish && options.finish) base.finish(job);
   return baked;
 }
 

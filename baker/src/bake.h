@@ -40,8 +40,8 @@ struct BakeOptions {
   LineSpaceOptions line_space;
   uint32_t cells = 0;  // along the longest side of the grid; 0: chosen from the scene
   CellTableOptions cell_tables;
-  double table_share =
-      0;  // about: bytes of tables over bytes of exact data, 0: no limit; see choose_cell_grid
+  double table_share = 0;     // bytes of tables over those of exact data that the grid is chosen for; 0: any
+  bool finish = true;         // false: without what needs the tables of all cells, as the dial does
   double cells_wrong = 0.01;  // share of the rays that the quality "balanced" may answer wrongly, see dial.h
   float plane_tolerance = 0.0f;         // LspHeader.plane_tolerance
   float normal_angle_degrees = 180.0f;  // LspHeader.normal_angle_cos; 180: no hit is rejected
@@ -122,6 +122,9 @@ void set_counts(Baked& baked);
 
 // Leaves out the tables of cells: wide nodes remain. `reason` is for the report.
 void leave_out_tables(Baked& baked, const std::string& reason);
+
+// What weighing adds to the bytes of tables, for their padding and what is stated of them.
+constexpr uint64_t kTablePadding = 8 << 12;
 
 // Bytes of what exact rays need and hits are shaded by: triangles, normals, materials, nodes.
 uint64_t exact_bytes(const Baked& baked);

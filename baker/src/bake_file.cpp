@@ -8,7 +8,6 @@
 #include "timer.h"
 
 namespace lsp {
-namespace {
 
 using Json = nlohmann::ordered_json;
 
@@ -18,7 +17,7 @@ std::vector<std::string> names_of(const std::vector<Material>& materials) {
   return names;
 }
 
-}  // namespace
+WriteOptions write_options(const Arguments& a) { return {a.align, a.compress == "zstd", 12, a.memory_limit}; }
 
 ImportOptions import_options(const Arguments& a) {
   ImportOptions options;
@@ -33,7 +32,7 @@ FileBake bake_file(Mesh& mesh, Arguments& a, const std::array<uint64_t, 2>& sour
                    const Progress& progress) {
   const std::vector<std::string> material_names = names_of(mesh.materials);
   make_color_materials(mesh);
-  const WriteOptions options = {a.align, a.compress == "zstd", 12, a.memory_limit};
+  const WriteOptions options = write_options(a);
   const auto meta_of = [&](const Chosen& c) {
     Json meta = provenance(a, c.baked, mesh, material_names, source, c.error);
     if (!part.is_null()) meta["mesh"] = part;

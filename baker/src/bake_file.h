@@ -21,6 +21,9 @@ struct FileBake {
 };
 
 ImportOptions import_options(const Arguments& a);
+WriteOptions write_options(const Arguments& a);
+
+std::vector<std::string> names_of(const std::vector<Material>& materials);
 
 // Bakes the mesh by the settings of `a`, which settle() has completed, for the file a.output. `source` is the
 // hash of mesh.sources. `part`, unless null, is META's `mesh`. Makes materials of the mesh's colours.

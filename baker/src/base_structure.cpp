@@ -1,8 +1,10 @@
 #include "base_structure.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "cells/dial.h"
+#include "lsp/program.h"
 #include "sites.h"
 
 namespace lsp {
@@ -69,26 +71,70 @@ void fill_ntree(BakeJob& job) {
     note_no_line_spaces(job.baked);
 }
 
+CellTables fill_tables(BakeJob& job, const CellTableOptions& options) {
+  const Baked& baked = job.baked;
+  return fill_cell_tables(baked.cell_grid, baked.wide, baked.header, baked.triangles, baked.materials,
+                          options, job.stage("cells"));
+}
+
+// Bytes that the tables will take, about: as those of some cells from all over the scene do.
+double estimate_tables(BakeJob& job) {
+  constexpr size_t kSample = 64;
+  const CellGrid& grid = job.baked.cell_grid;
+  CellTableOptions options = job.options.cell_tables;
+  options.shard = {1, uint32_t(std::max<size_t>(1, grid.cells.size() / kSample))};
+  const CellTables t = fill_tables(job, options);
+  const size_t bytes = t.cells.size() * sizeof(LspFilledCell) + t.entries.size() * 4 +
+                       t.planes.size() * (sizeof(LspPlane) + 4) + t.splits.size() * sizeof(LspSplit) +
+                       t.nodes.size() * sizeof(LspCellNode) + t.references.size() * 4;
+  const double cells = double(grid.cells.size()) / double(std::max<size_t>(1, t.cells.size()));
+  return double(grid.words.size() * 4) + double(bytes) * cells;
+}
+
+// A grid so coarse that its tables take no more than they may, or nearly: they grow with the square of the
+// cells on the longest side. Where there is none the tables of the last one tried are too long.
+void coarsen(BakeJob& job) {
+  constexpr double kSafe = 0.93;  // an estimate is off by a few per cent
+  const double most = job.options.table_share * double(exact_bytes(job.baked)) - double(kTablePadding);
+  CellGrid& grid = job.baked.cell_grid;
+  for (;;) {
+    const double longest = std::max({grid.dims.x, grid.dims.y, grid.dims.z});
+    if (most <= 0 || longest == 1 || grid.crowded) return;
+    const double tables = estimate_tables(job);
+    if (tables <= kSafe * most) return;
+    const double part = std::min(std::sqrt(0.97 * kSafe * most / tables), 1 - 1 / longest);
+    try {
+      grid = build_cell_grid(job.baked.triangles, job.bounds, std::max(1u, uint32_t(longest * part)));
+    } catch (const Failure& failure) {
+      if (failure.exit() != Exit::kLimit) throw;
+      return;  // a cell of that grid would hold too many triangles
+    }
+  }
+}
+
 void build_cells_base(BakeJob& job) {
+  const BakeOptions& options = job.options;
   Baked& baked = job.baked;
   baked.header.base_structure = LSP_BASE_CELLS;
-  // What a filled cell takes, on average: 12 kB to 15 kB of objects, 20 kB of rooms.
-  constexpr double kCellBytes = 15000;
-  const double most = job.options.table_share * double(exact_bytes(baked)) / kCellBytes;
-  baked.cell_grid = job.options.cells
-                        ? build_cell_grid(baked.triangles, job.bounds, job.options.cells)
-                        : choose_cell_grid(baked.triangles, job.bounds,
-                                           job.options.table_share > 0 ? size_t(most) : SIZE_MAX);
+  if (options.cells) {
+    baked.cell_grid = build_cell_grid(baked.triangles, job.bounds, options.cells);
+    return;
+  }
+  // What a filled cell takes at least: 12 kB to 15 kB of objects, 20 kB of rooms.
+  constexpr double kCellBytes = 12000;
+  const bool any = options.table_share == 0;
+  const double most = options.table_share * double(exact_bytes(baked)) / kCellBytes;
+  baked.cell_grid = choose_cell_grid(baked.triangles, job.bounds, any ? SIZE_MAX : size_t(most));
+  if (!any) coarsen(job);
 }
 
 void fill_cells(BakeJob& job) {
   const CellTableOptions& options = job.options.cell_tables;
   Baked& baked = job.baked;
-  baked.cell_tables = fill_cell_tables(baked.cell_grid, baked.wide, baked.header, baked.triangles,
-                                       baked.materials, options, job.stage("cells"));
+  baked.cell_tables = fill_tables(job, options);
   set_cells(baked.cell_grid, baked.cell_tables, options, baked.header);
   const size_t cells = baked.cell_grid.words.size();
-  baked.skipped.push_back("empty cells: " + with_commas(cells - baked.cell_tables.cells.size()) + " of " +
+  baked.skipped.push_back("empty cells: " + with_commas(cells - baked.cell_grid.cells.size()) + " of " +
                           with_commas(cells));
 }
 

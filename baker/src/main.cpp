@@ -8,22 +8,17 @@
 
 #include "bake_file.h"
 #include "bake_scene.h"
+#include "color_materials.h"
 #include "lsp/command_line.h"
 #include "provenance.h"
 #include "report.h"
+#include "shard/write_shard.h"
+#include "temporary_file.h"
 #include "timer.h"
 
 namespace {
 
 using namespace lsp;
-
-// Before the work: a bake takes seconds to minutes.
-void check_folder(const std::filesystem::path& output) {
-  const std::filesystem::path folder = output.has_parent_path() ? output.parent_path() : ".";
-  if (!std::filesystem::is_directory(folder))
-    throw Failure(Exit::kFile, output.string(),
-                  "cannot be written: there is no folder " + folder.string() + ", make it or choose another");
-}
 
 void bake_one(Arguments& a, ProgressBar& bar) {
   Timer timer;
@@ -32,6 +27,14 @@ void bake_one(Arguments& a, ProgressBar& bar) {
   if (a.strict) refuse_notes(mesh.notes, a);
   const auto source = hash_sources(mesh);
   const double import_seconds = timer();
+  if (!a.shard.empty()) {
+    const std::vector<std::string> names = names_of(mesh.materials);
+    make_color_materials(mesh);
+    write_shard(a, {mesh, names, source, import_seconds}, write_options(a),
+                [&](std::string_view stage, double share) { bar.show(stage, share); });
+    if (!a.depfile.empty()) write_depfile(a, mesh.sources);
+    return;
+  }
 
   const FileBake done = bake_file(mesh, a, source, nullptr,
                                   [&](std::string_view stage, double share) { bar.show(stage, share); });
@@ -155,6 +158,9 @@ int main(int argc, char** argv) {
   app.add_flag("--strict", a.strict, "Refuse, with exit 3, an input that leads to any note");
   app.add_option("--depfile", a.depfile,
                  "Write a rule for Make and Ninja: OUT.lsp (or NAME.json): every file that was read");
+  app.add_option(
+      "--shard", a.shard,
+      "Bake share I of K of the cells, and write it as a part that lsp-merge joins with the others");
   app.add_flag("--no-splits", a.no_splits, "Build the tree without spatial splits");
   add_common_options(app, "lsp-bake", a.common);
   arrange_help(
@@ -168,7 +174,7 @@ int main(int argc, char** argv) {
          "--no-line-spaces", "--exact", "--no-exact"}},
        {"What is read",
         {"--time SECONDS", "--animation NAME", "--crease-angle DEGREES", "--strict", "--depfile FILE"}},
-       {"The machine and the file", {"--threads", "--memory-limit", "--align"}}});
+       {"The machine and the file", {"--threads", "--memory-limit", "--align", "--shard I/K"}}});
   return run_program("lsp-bake", app, argc, argv, [&] {
     a.resolution_given = resolution->count() > 0;
     a.depth_given = depth->count() > 0;

@@ -6,7 +6,7 @@
 #include <map>
 #include <optional>
 
-#include "cells/dial.h"
+#include "accuracy.h"
 #include "import/text.h"
 #include "lsp/program.h"
 
@@ -25,7 +25,6 @@ const std::map<std::string, Preset> kPresets = {
     {"fast", {{4, 8, 3}, 24, 8}}, {"balanced", {{6, 9, 5}, 64, 24}}, {"accurate", {{6, 11, 9}, 128, 72}}};
 // From cheap to dear, for --max-error.
 const std::vector<Quality> kLadder = {{4, 7, 5}, {4, 9, 5}, {6, 9, 5}, {6, 11, 9}, {8, 11, 9}, {8, 13, 9}};
-constexpr uint64_t kErrorRays = 65536;
 const std::map<std::string, Base> kBases = {
     {"bvh", Base::kBvh}, {"ntree", Base::kNTree}, {"cells", Base::kCells}, {"wide", Base::kWide}};
 
@@ -74,6 +73,13 @@ void check(const Arguments& a) {
     throw Failure(Exit::kUsage, "", "--time is no number of seconds, give one");
   if (ntree && a.max_error > 0)
     throw Failure(Exit::kUsage, "", "--max-error chooses among cells or BVHs: leave out --base ntree");
+  if (!a.shard.empty() && !cells)
+    throw Failure(Exit::kUsage, "",
+                  "--shard divides the cells of --base cells: leave out --base " + a.base +
+                      " and what is of Line Spaces, or bake in one, without --shard");
+  if (!a.shard.empty() && a.max_size)
+    throw Failure(Exit::kUsage, "",
+                  "--max-size needs the whole bake, which no --shard has: choose the grid by --cells");
   if (a.no_line_spaces && a.no_exact)
     throw Failure(Exit::kUsage, "", "--no-line-spaces with --no-exact leaves nothing to trace");
 }
@@ -84,6 +90,8 @@ BakeOptions bake_options(const Arguments& a) {
   options.line_spaces = !a.no_line_spaces;
   options.base = kBases.at(a.base);
   options.cells = a.cells;
+  options.cells_wrong = accuracy_of(a).wrong;
+  if (a.weigh_tables) options.table_share = kTableShare;
   const Preset& preset = kPresets.at(a.preset);
   options.cell_tables.far_samples = preset.far_samples;
   options.cell_tables.origin_samples = preset.origin_samples;
@@ -119,72 +127,16 @@ Chosen climb(const Mesh& mesh, Arguments& a, const Progress& progress) {
   return chosen;
 }
 
-// Cells whose dial keeps the error where one was asked for, if any point of it does.
-Chosen bake_cells(const Mesh& mesh, const Arguments& a, const Progress& progress) {
-  BakeOptions options = bake_options(a);
-  if (a.max_error > 0) options.cells_wrong = a.max_error / 100;
+// Cells whose dial keeps the error where one was asked for, if any point of it does; wide nodes alone where
+// tables are weighed, and not worth it.
+Chosen bake_cells(const Mesh& mesh, Arguments& a, const Progress& progress) {
   Chosen chosen;
-  chosen.baked = bake(mesh, options, progress);
-  chosen.error = measure_error(chosen.baked, kErrorRays);
-  // The dial is measured on rays of its own: what they flattered is asked for again, more sternly, and in
-  // the end everything is traced exactly.
-  for (const double part : {0.7, 0.5, 0.3, 0.0}) {
-    if (a.max_error == 0 || 100 * chosen.error.wrong_share() <= a.max_error) break;
-    choose_dial(chosen.baked, part * options.cells_wrong);
-    chosen.error = measure_error(chosen.baked, kErrorRays);
-  }
-  return chosen;
-}
-
-// Of what depends on the grid.
-uint64_t table_bytes(const Baked& baked) {
-  const SectionArrays arrays{baked};
-  uint64_t bytes = 0;
-#define LSP_ARRAY_SECTION(Name, TYPE, code, Element, flag, base, feature, owed, member, ...) \
-  if ((feature) == LSP_FEATURE_CELLS) bytes += uint64_t{arrays.member.size()} * sizeof(Element);
-#include "lsp/sections.def"
-  return bytes;
-}
-
-// Cells whose tables take at most three times the exact data, on the finest grid of which this is so, or
-// nearly. False: there is none, `baked` has more.
-bool bake_small_tables(const Mesh& mesh, BakeOptions options, const Progress& progress, Baked& baked) {
-  constexpr double kTableShare = 3;
-  constexpr uint64_t kPadding =
-      8 << 12;  // about: of the eight sections of tables, and what is stated of them
-  constexpr int kBakes = 3;
-  options.table_share = kTableShare;
-  baked = bake(mesh, options, progress);
-  for (int bakes = 1;; ++bakes) {
-    const double most = kTableShare * double(exact_bytes(baked));
-    const double tables = double(table_bytes(baked) + kPadding);
-    if (tables <= most) return true;
-    const double longest = longest_side(baked.header.cells);
-    options.cells = uint32_t(longest * std::min(std::sqrt(most / tables), 1 - 1 / longest));
-    if (options.cells == 0 || bakes == kBakes || baked.cell_grid.crowded) return false;
-    try {
-      baked = bake(mesh, options, progress);
-    } catch (const Failure& failure) {
-      if (failure.exit() != Exit::kLimit) throw;
-      return false;  // a cell of that grid would hold too many triangles
-    }
-  }
-}
-
-// Cells as fine as they are worth their bytes; none where a ray through them takes as long as an exact one.
-Chosen bake_weighed(const Mesh& mesh, Arguments& a, const Progress& progress) {
-  constexpr Gain kWorth = {1.05, 0.97};  // at least, of both
-  Chosen chosen;
-  Baked& baked = chosen.baked;
-  if (!bake_small_tables(mesh, bake_options(a), progress, baked)) {
-    leave_out_tables(baked, "of so small a mesh, they would be more than three times its exact data");
-  } else if (baked.gain.vulkan < kWorth.vulkan || baked.gain.cpu < kWorth.cpu) {
-    leave_out_tables(baked, "a ray through them would take as long as an exact one");
-  } else {
-    chosen.error = measure_error(baked, kErrorRays);
+  chosen.baked = bake(mesh, bake_options(a), progress);
+  if (a.weigh_tables && weigh_tables(chosen.baked)) {
+    a.base = "wide";
     return chosen;
   }
-  a.base = "wide";
+  chosen.error = settle_dial(chosen.baked, accuracy_of(a));
   return chosen;
 }
 
@@ -202,9 +154,7 @@ void leave_out_exact(Baked& baked, bool cells) {
 Chosen bake_accurately(const Mesh& mesh, Arguments& a, const Progress& progress) {
   const bool cells = a.base == "cells";
   Chosen chosen;
-  if (a.weigh_tables) {
-    chosen = bake_weighed(mesh, a, progress);
-  } else if (cells) {
+  if (cells) {
     chosen = bake_cells(mesh, a, progress);
   } else if (a.max_error > 0) {
     chosen = climb(mesh, a, progress);
@@ -213,15 +163,7 @@ Chosen bake_accurately(const Mesh& mesh, Arguments& a, const Progress& progress)
     if (!a.no_line_spaces && a.purpose != Purpose::kVisibility)
       chosen.error = measure_error(chosen.baked, kErrorRays);
   }
-  if (a.max_error > 0 && 100 * chosen.error.wrong_share() > a.max_error) {
-    char text[160];
-    std::snprintf(
-        text, sizeof text,
-        "the most accurate setting still answers %.3f %% of rays wrongly, over --max-error %g: allow more, "
-        "or trace exactly",
-        100 * chosen.error.wrong_share(), a.max_error);
-    throw Failure(Exit::kLimit, a.inputs[0].string(), text);
-  }
+  check_error(chosen.error, a.max_error, a.inputs[0].string());
   if (a.no_exact) leave_out_exact(chosen.baked, cells);
   return chosen;
 }
@@ -282,6 +224,7 @@ void settle(Arguments& a) {
   a.base = base_of(a);
   a.weigh_tables = !asked && a.base == "cells";
   check(a);
+  if (!a.shard.empty()) parse_shard(a.shard);
   const Preset& preset = kPresets.at(a.preset);
   const bool ntree = a.base == "ntree";
   if (!a.resolution_given) a.resolution = preset.line_spaces.resolution;
@@ -290,6 +233,21 @@ void settle(Arguments& a) {
   // 142 MB.
   if (!a.depth_given) a.depths = {ntree ? std::min(a.levels - 1, 1u) : preset.line_spaces.depth};
   if (!a.samples_given) a.samples = preset.line_spaces.samples;
+}
+
+Accuracy accuracy_of(const Arguments& a) {
+  Accuracy accuracy;
+  accuracy.max_error = a.max_error;
+  accuracy.weighed = a.weigh_tables;
+  if (a.max_error > 0) accuracy.wrong = a.max_error / 100;
+  return accuracy;
+}
+
+Baked bake_shard(const Mesh& mesh, const Arguments& a, const Shard& shard, const Progress& progress) {
+  BakeOptions options = bake_options(a);
+  options.cell_tables.shard = shard;
+  options.finish = false;
+  return bake(mesh, options, progress);
 }
 
 Chosen bake_as_asked(const Mesh& mesh, Arguments& a, const Progress& progress, const FileSize& file_size) {

@@ -4,8 +4,8 @@
 
 #include <functional>
 
+#include "accuracy.h"
 #include "arguments.h"
-#include "error.h"
 
 namespace lsp {
 
@@ -17,6 +17,12 @@ struct Chosen {
   Baked baked;
   MeasuredError error;
 };
+
+// What a bake of cells is asked to keep.
+Accuracy accuracy_of(const Arguments& a);
+
+// One shard of the cells, not finished: its dial and its error only the whole bake has.
+Baked bake_shard(const Mesh& mesh, const Arguments& a, const Shard& shard, const Progress& progress);
 
 // How long the file of a bake would be, in bytes.
 using FileSize = std::function<uint64_t(Chosen&)>;

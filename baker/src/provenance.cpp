@@ -1,10 +1,9 @@
 #include "provenance.h"
 
-#include <cinttypes>
-#include <cstdio>
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "figures.h"
 #include "import/source_file.h"
 #include "lsp/program.h"
 #include "writer.h"
@@ -14,16 +13,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Null where nothing could be measured.
-Json to_json(const MeasuredError& e) {
-  if (e.rays == 0) return nullptr;
-  return {{"rays", e.rays},
-          {"wrong_hits", e.wrong_hits},
-          {"wrong_misses", e.wrong_misses},
-          {"wrong_percent", 100 * e.wrong_share()},
-          {"depth_error_percent_of_diagonal", 100 * e.depth_error}};
-}
-
 // The path of a source relative to the folder of the input that led to it.
 std::string name_beside(const std::filesystem::path& file, const std::filesystem::path& input) {
   const std::filesystem::path folder = input.parent_path();
@@ -32,12 +21,6 @@ std::string name_beside(const std::filesystem::path& file, const std::filesystem
 }
 
 }  // namespace
-
-std::string hex128(uint64_t lo, uint64_t hi) {
-  char text[33];
-  std::snprintf(text, sizeof text, "%016" PRIx64 "%016" PRIx64, hi, lo);
-  return text;
-}
 
 void write_depfile(const Arguments& a, const std::vector<std::vector<std::filesystem::path>>& sources) {
   const auto escaped = [](const std::filesystem::path& path) {

@@ -17,7 +17,4 @@ nlohmann::ordered_json provenance(const Arguments& a, const Baked& baked, const 
 // A rule for Make and Ninja: the output depends on every file that was read, `sources` as Mesh has them.
 void write_depfile(const Arguments& a, const std::vector<std::vector<std::filesystem::path>>& sources);
 
-// A hash of 128 bits in hexadecimal digits.
-std::string hex128(uint64_t lo, uint64_t hi);
-
 }  // namespace lsp

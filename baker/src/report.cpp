@@ -3,10 +3,9 @@
 #include <algorithm>
 #include <cinttypes>
 #include <cstdio>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "provenance.h"
+#include "figures.h"
 
 namespace lsp {
 namespace {
@@ -15,24 +14,6 @@ namespace {
 uint32_t nodes_of(const LspHeader& header) { return header.node_count + header.wide_node_count; }
 
 using Json = nlohmann::ordered_json;
-
-// The most memory this process has held; 0 where the system does not tell. getrusage would count what the
-// process that started this one held.
-uint64_t peak_memory_bytes() {
-  std::ifstream status("/proc/self/status");
-  for (std::string line; std::getline(status, line);)
-    if (line.starts_with("VmHWM:")) return std::stoull(line.substr(6)) * 1024;
-  return 0;
-}
-
-std::string size_text(uint64_t bytes) {
-  char text[32];
-  if (bytes < 1000000)
-    std::snprintf(text, sizeof text, "%.2f kB", double(bytes) / 1e3);
-  else
-    std::snprintf(text, sizeof text, "%.2f MB", double(bytes) / 1e6);
-  return text;
-}
 
 // Triangle records that are there in part.
 uint64_t partial_records(const Baked& baked) {
@@ -53,9 +34,6 @@ Json cells_json(const LspHeader& h) {
 Json report_json(const BakeReport& done, const Json& meta) {
   const Baked& baked = done.baked;
   const LineSpaces& ls = baked.line_spaces;
-  Json sections = Json::array();
-  for (const WrittenSection& s : done.written.sections)
-    sections.push_back({{"name", s.name}, {"bytes", s.bytes}, {"stored_bytes", s.stored_bytes}});
   return {{"output", done.arguments.output.string()},
           {"triangles", meta["triangles"]},
           {"origin", meta["origin"]},
@@ -79,14 +57,13 @@ Json report_json(const BakeReport& done, const Json& meta) {
           {"peak_memory_bytes", peak_memory_bytes()},
           {"file_bytes", done.written.file_bytes},
           {"content_hash", hex128(baked.header.content_hash_lo, baked.header.content_hash_hi)},
-          {"sections", sections}};
+          {"sections", to_json(done.written.sections)}};
 }
 
 void print_report(const BakeReport& done) {
   const Mesh& mesh = done.mesh;
   const Baked& baked = done.baked;
   const LineSpaces& ls = baked.line_spaces;
-  const MeasuredError& error = done.error;
   std::printf("read        %" PRIu64 " triangles, kept %zu\n", mesh.primitive_count, mesh.triangles.size());
   if (mesh.rejected.total())
     std::printf("dropped     %" PRIu64 " degenerate, %" PRIu64 " non-finite, %" PRIu64
@@ -108,20 +85,12 @@ void print_report(const BakeReport& done) {
   if (baked.header.line_space_count)
     std::printf("Line Spaces %u, %.1f %% of the shafts filled\n", baked.header.line_space_count,
                 100.0 * double(ls.filled) / double(std::max<uint64_t>(1, ls.shafts)));
-  if (error.rays)
-    std::printf(
-        "error       %.2f %% wrong hits, %.2f %% wrong misses, depth off by %.2f %% of the diagonal\n",
-        100.0 * double(error.wrong_hits) / double(error.rays),
-        100.0 * double(error.wrong_misses) / double(error.rays), 100 * error.depth_error);
+  print_error(done.error);
   for (const std::string& s : baked.skipped) std::printf("skipped     %s\n", s.c_str());
   std::printf("time        import %.2f s, tree %.2f s, Line Spaces %.2f s, write %.2f s; peak memory %s\n",
               done.import_seconds, baked.tree_seconds, baked.line_space_seconds, done.write_seconds,
               size_text(peak_memory_bytes()).c_str());
-  for (const WrittenSection& s : done.written.sections) {
-    std::printf("section     %s %12s", s.name.c_str(), size_text(s.bytes).c_str());
-    if (s.stored_bytes != s.bytes) std::printf(", packed %s", size_text(s.stored_bytes).c_str());
-    std::printf("\n");
-  }
+  print_sections(done.written.sections);
   std::printf("wrote       %s, %s\n", done.arguments.output.c_str(),
               size_text(done.written.file_bytes).c_str());
   std::fflush(stdout);

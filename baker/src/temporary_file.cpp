@@ -64,4 +64,11 @@ void TemporaryFile::fail(const char* what) const {
       std::string(what) + ": " + std::strerror(errno) + "; give another place with -o or make room");
 }
 
+void check_folder(const std::filesystem::path& output) {
+  const std::filesystem::path folder = output.has_parent_path() ? output.parent_path() : ".";
+  if (!std::filesystem::is_directory(folder))
+    throw Failure(Exit::kFile, output.string(),
+                  "cannot be written: there is no folder " + folder.string() + ", make it or choose another");
+}
+
 }  // namespace lsp

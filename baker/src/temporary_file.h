@@ -31,4 +31,7 @@ class TemporaryFile {
   uint64_t position_ = 0;
 };
 
+// Throws Failure with Exit::kFile where `output` has no folder to lie in: before the work.
+void check_folder(const std::filesystem::path& output);
+
 }  // namespace lsp

@@ -11,6 +11,7 @@
 
 #include "lsp/program.h"
 #include "lsp/sections.h"
+#include "temporary_file.h"
 
 namespace lsp {
 namespace {

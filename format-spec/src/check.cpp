@@ -38,6 +38,46 @@ bool tree_usable(const FileView& view) {
   return usable;
 }
 
+void check_structure(const FileView& view, Level level, Report& report) {
+  const bool ntree = is_ntree(view.header);
+  // Without EXACT a file of cells has no tree.
+  const bool none = has_cells(view.header) && (view.header.required_features & LSP_FEATURE_EXACT) == 0;
+  const bool tree = !none && (!ntree || ntree_readable(view.header)) && tree_usable(view);
+  if (tree)
+    ntree                     ? check_ntree(view, report)
+    : walks_wide(view.header) ? check_wide(view, report)
+                              : check_tree(view, report);
+  if (has_cells(view.header) && cells_readable(view.header) && tree_usable(view)) check_cells(view, report);
+  if (view.part(Kind::kLspc).usable) check_line_spaces(view, report);
+  if (level < Level::kGeometry) return;
+
+  if (tree && tree_sound(report)) {
+    check_geometry(view, report);
+    if (ntree && cells_sound(report)) check_ntree_geometry(view, report);
+  }
+}
+
+// Fills view.parts with the contents that are as long as the header says.
+void view_contents(const Contents& contents, FileView& view, Report& report) {
+  for (int k = 0; k < kKinds; ++k) {
+    const Kind kind = static_cast<Kind>(k);
+    const std::span<const std::byte> data = contents[static_cast<size_t>(k)];
+    if (!data.empty()) {
+      LspSection section{};
+      section.type = info(kind).type;
+      view.table.push_back(section);
+    }
+    const uint64_t bytes = declared_count(view.header, kind).value_or(0) * info(kind).element_bytes;
+    // As in a file, normals are of all triangles or not there.
+    const bool left_out = kind == Kind::kNrml && data.empty();
+    if (data.size() == bytes || left_out)
+      view.parts[static_cast<size_t>(k)] = {!data.empty(), false, 0, data.size(), data, !data.empty()};
+    else
+      report.add(RuleId::kCountDiffers, 0, 0, std::string("/sections/") + info(kind).name,
+                 "has " + std::to_string(data.size()) + " bytes, the header states " + std::to_string(bytes));
+  }
+}
+
 }  // namespace
 
 Report check_file(std::span<const std::byte> bytes, const CheckOptions& options) {
@@ -53,23 +93,17 @@ Report check_file(std::span<const std::byte> bytes, const CheckOptions& options)
   if (report.fatal()) return report;
   check_metadata(view, report);
   if (options.level < Level::kStructure) return report;
+  check_structure(view, options.level, report);
+  return report;
+}
 
-  const bool ntree = is_ntree(view.header);
-  // Without EXACT a file of cells has no tree.
-  const bool none = has_cells(view.header) && (view.header.required_features & LSP_FEATURE_EXACT) == 0;
-  const bool tree = !none && (!ntree || ntree_readable(view.header)) && tree_usable(view);
-  if (tree)
-    ntree                     ? check_ntree(view, report)
-    : walks_wide(view.header) ? check_wide(view, report)
-                              : check_tree(view, report);
-  if (has_cells(view.header) && cells_readable(view.header) && tree_usable(view)) check_cells(view, report);
-  if (view.part(Kind::kLspc).usable) check_line_spaces(view, report);
-  if (options.level < Level::kGeometry) return report;
-
-  if (tree && tree_sound(report)) {
-    check_geometry(view, report);
-    if (ntree && cells_sound(report)) check_ntree_geometry(view, report);
-  }
+Report check_contents(const LspHeader& header, const Contents& contents, const CheckOptions& options) {
+  Report report(options.examples_per_rule);
+  FileView view;
+  view.header = header;
+  view_contents(contents, view, report);
+  check_statements(view, report);
+  if (report.verdict() == Verdict::kValid) check_structure(view, options.level, report);
   return report;
 }
 

@@ -7,6 +7,9 @@
 // Nothing is written, no thread is started. Time is proportional to the file's size.
 #pragma once
 
+#include <lsp/sections.h>
+
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -31,5 +34,12 @@ struct CheckOptions {
 };
 
 Report check_file(std::span<const std::byte> bytes, const CheckOptions& options = {});
+
+// By kind what a section holds, 16-byte aligned; empty: no section.
+using Contents = std::array<std::span<const std::byte>, kKinds>;
+
+// The same of what is to become a file, at least at the level structure. Nothing is asked of what a place in
+// a file decides: magic numbers, offsets, lengths, hashes and metadata.
+Report check_contents(const LspHeader& header, const Contents& contents, const CheckOptions& options = {});
 
 }  // namespace lsp::format

@@ -310,6 +310,11 @@ void check_header(const FileView& view, Report& report) {
                        std::to_string(header.section_count) + " table entries do not fit into " +
                            std::to_string(view.bytes.size()) + " bytes");
   check_length(view, report);
+  check_statements(view, report);
+}
+
+void check_statements(const FileView& view, Report& report) {
+  const LspHeader& header = view.header;
   check_base(header, report);
   check_limits(header, report);
   check_numbers(header, report);

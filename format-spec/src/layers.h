@@ -12,6 +12,8 @@ namespace lsp::format {
 // Everything before it is trusted: a layer runs only when what it relies on is usable.
 void check_identification(const FileView& view, Report& report);
 void check_header(const FileView& view, Report& report);
+// The part of it that is of the scene, not of the file.
+void check_statements(const FileView& view, Report& report);
 
 // Checks the table and the padding, and fills view.parts with what lies soundly inside the file.
 void check_sections(FileView& view, Report& report);

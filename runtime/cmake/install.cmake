@@ -67,6 +67,7 @@ endfunction()
 # where they are installed.
 function(lsp_install_programs)
   set(does_lsp-bake "turn meshes into .lsp files")
+  set(does_lsp-merge "join the parts of a bake")
   set(does_lsp-validate "check .lsp files")
   set(does_lsp-info "show what an .lsp file holds")
   set(does_lsp-trace "trace rays in an .lsp file")

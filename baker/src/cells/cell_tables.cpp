@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <bit>
 
 #include "../vectors.h"
 #include "cell_filler.h"
@@ -15,13 +14,20 @@ namespace {
 constexpr float kOffset = 1e-4f;  // of the scene's diagonal, as renderers move ray origins off the surface
 constexpr size_t kBatch = 256;    // cells that are filled before they are packed
 
-// Appends entries to words that hold `count` so far.
-void append(std::span<const uint16_t> entries, std::vector<uint32_t>& words, uint64_t& count) {
-  for (uint16_t e : entries) {
-    if (count % 2 == 0) words.push_back(0);
-    words.back() |= uint32_t(e) << (count % 2 ? 16 : 0);
-    ++count;
-  }
+// Entries, of which there is an even number, two in a word.
+std::vector<uint32_t> words_of(std::span<const uint16_t> entries) {
+  std::vector<uint32_t> words(entries.size() / 2);
+  for (size_t i = 0; i < words.size(); ++i) words[i] = entries[2 * i] | uint32_t{entries[2 * i + 1]} << 16;
+  return words;
+}
+
+void add_to(CellTablesBuilder& tables, const FilledCell& f, float cell_size) {
+  std::vector<LspPlane> planes;
+  for (const Plane& p : f.planes)
+    planes.push_back({{p.normal.x, p.normal.y, p.normal.z}, p.distance / cell_size});
+  const std::vector<uint32_t> far = words_of(f.far), origin = words_of(f.origin);
+  tables.add({f.sub_mask, f.tree.root, far, origin, planes, f.plane_records, f.splits, f.tree.nodes,
+              f.tree.references});
 }
 
 }  // namespace
@@ -74,51 +80,20 @@ CellTables fill_cell_tables(const CellGrid& grid, const WideTree& tree, const Ls
   for (const LspMaterial& m : materials) colors.push_back(vec(m.base_color) + vec(m.emission));
   const CellScene scene{grid, whole, numbered, colors, options, kOffset * diagonal};
 
-  CellTables out;
-  uint64_t entries = 0;
-  uint32_t subs = 0;
-  std::vector<uint16_t> origins;
+  CellTablesBuilder tables;
   std::atomic<size_t> done{0};
-  for (size_t begin = 0; begin < grid.cells.size(); begin += kBatch) {
-    const size_t end = std::min(grid.cells.size(), begin + kBatch);
+  const size_t cells = options.shard.share_of(grid.cells.size());
+  for (size_t begin = 0; begin < cells; begin += kBatch) {
+    const size_t end = std::min(cells, begin + kBatch);
     std::vector<FilledCell> filled(end - begin);
     tbb::parallel_for(begin, end, [&](size_t i) {
-      filled[i - begin] = fill_cell(scene, uint32_t(i));
+      filled[i - begin] = fill_cell(scene, uint32_t(options.shard.item(i)));
       const size_t now = ++done;
-      if (progress && now % 16 == 0) progress(double(now) / double(grid.cells.size()));
+      if (progress && now % 16 == 0) progress(double(now) / double(cells));
     });
-    for (size_t i = begin; i < end; ++i) {
-      const FilledCell& f = filled[i - begin];
-      LspFilledCell record{};
-      record.sub_mask_lo = uint32_t(f.sub_mask);
-      record.sub_mask_hi = uint32_t(f.sub_mask >> 32);
-      record.sub_first = subs;
-      subs += uint32_t(std::popcount(f.sub_mask));
-      record.plane_first = uint32_t(out.planes.size());
-      record.plane_count = uint32_t(f.planes.size());
-      record.split_first = uint32_t(out.splits.size());
-      record.split_count = uint32_t(f.splits.size());
-      record.root = f.tree.root;
-      record.node_first = uint32_t(out.nodes.size());
-      record.reference_first = uint32_t(out.references.size());
-      record.max_steps = uint32_t(f.tree.nodes.size());
-      out.cells.push_back(record);
-      for (const Plane& p : f.planes)
-        out.planes.push_back({{p.normal.x, p.normal.y, p.normal.z}, p.distance / grid.size});
-      out.plane_records.insert(out.plane_records.end(), f.plane_records.begin(), f.plane_records.end());
-      out.splits.insert(out.splits.end(), f.splits.begin(), f.splits.end());
-      out.nodes.insert(out.nodes.end(), f.tree.nodes.begin(), f.tree.nodes.end());
-      out.references.insert(out.references.end(), f.tree.references.begin(), f.tree.references.end());
-      out.overflowed += f.overflow;
-      append(f.far, out.entries, entries);
-      origins.insert(origins.end(), f.origin.begin(), f.origin.end());
-    }
+    for (const FilledCell& f : filled) add_to(tables, f, grid.size);
   }
-  out.far_entries = entries;
-  out.origin_entry_first = uint32_t(entries);
-  append(origins, out.entries, entries);
-  out.origin_entries = origins.size();
-  return out;
+  return tables.finish();
 }
 
 }  // namespace lsp

@@ -10,6 +10,7 @@
 
 #include "cell_grid.h"
 #include "lsp/layout.h"
+#include "shard/shard.h"
 #include "wide_tree.h"
 
 namespace lsp {
@@ -21,6 +22,7 @@ struct CellTableOptions {
   uint32_t far_samples = 64;     // rays of a mixed shaft
   uint32_t origin_samples = 24;  // rays of an entry of an origin table, on average, as none is settled
   bool splits = true;
+  Shard shard;  // the cells that are filled
 };
 
 struct CellTables {
@@ -32,12 +34,38 @@ struct CellTables {
   std::vector<LspCellNode> nodes;
   std::vector<uint32_t> references;  // of leaves: LspTriangle
   uint32_t origin_entry_first = 0;
-  // For the report.
-  uint64_t far_entries = 0, origin_entries = 0, overflowed = 0;
 };
 
-// Fills the tables of all cells of the grid on all threads of the current oneTBB arena; the result does not
-// depend on their number. `tree` is of the triangles.
+// What one cell owns of them.
+struct CellPieces {
+  uint64_t sub_mask = 0;
+  uint32_t root = LSP_CELL_NO_CHILD;
+  std::span<const uint32_t> far, origin;  // entries, two in a word
+  std::span<const LspPlane> planes;
+  std::span<const uint32_t> plane_records;
+  std::span<const LspSplit> splits;
+  std::span<const LspCellNode> nodes;
+  std::span<const uint32_t> references;
+};
+
+// Puts tables together, cell after cell.
+class CellTablesBuilder {
+ public:
+  void add(const CellPieces& cell);
+  CellTables finish();  // once
+
+ private:
+  CellTables tables_;
+  std::vector<uint32_t> origins_;  // words of origin tables, which follow all far ones
+  uint32_t subs_ = 0;
+};
+
+// Words of a cell's far table, and of each of its origin tables.
+inline uint64_t far_words(uint64_t patches) { return 15 * patches * patches * patches * patches; }
+inline uint64_t origin_words(uint64_t patches) { return 3 * patches * patches; }
+
+// Fills the tables of the shard's cells of the grid on all threads of the current oneTBB arena; the result
+// does not depend on their number, nor that of a cell on the other cells. `tree` is of the triangles.
 CellTables fill_cell_tables(const CellGrid& grid, const WideTree& tree, const LspHeader& header,
                             std::span<const LspTriangle> triangles, std::span<const LspMaterial> materials,
                             const CellTableOptions& options,

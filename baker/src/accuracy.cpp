@@ -1,0 +1,55 @@
+#include "accuracy.h"
+
+#include <cstdio>
+
+#include "cells/dial.h"
+#include "lsp/program.h"
+
+namespace lsp {
+
+uint64_t table_bytes(const Baked& baked) {
+  const SectionArrays arrays{baked};
+  uint64_t bytes = 0;
+#define LSP_ARRAY_SECTION(Name, TYPE, code, Element, flag, base, feature, owed, member, ...) \
+  if ((feature) == LSP_FEATURE_CELLS) bytes += uint64_t{arrays.member.size()} * sizeof(Element);
+#include "lsp/sections.def"
+  return bytes;
+}
+
+bool weigh_tables(Baked& baked) {
+  constexpr Gain kWorth = {1.05, 0.97};  // at least, of both
+  if (double(table_bytes(baked) + kTablePadding) > kTableShare * double(exact_bytes(baked))) {
+    leave_out_tables(baked, "of so small a mesh, they would be more than three times its exact data");
+    return true;
+  }
+  if (baked.gain.vulkan < kWorth.vulkan || baked.gain.cpu < kWorth.cpu) {
+    leave_out_tables(baked, "a ray through them would take as long as an exact one");
+    return true;
+  }
+  return false;
+}
+
+MeasuredError settle_dial(Baked& baked, const Accuracy& asked) {
+  MeasuredError error = measure_error(baked, kErrorRays);
+  // The dial is measured on rays of its own: what they flattered is asked for again, more sternly, and in
+  // the end everything is traced exactly.
+  for (const double part : {0.7, 0.5, 0.3, 0.0}) {
+    if (asked.max_error == 0 || 100 * error.wrong_share() <= asked.max_error) break;
+    choose_dial(baked, part * asked.wrong);
+    error = measure_error(baked, kErrorRays);
+  }
+  return error;
+}
+
+void check_error(const MeasuredError& error, double max_error, const std::string& file) {
+  if (max_error == 0 || 100 * error.wrong_share() <= max_error) return;
+  char text[160];
+  std::snprintf(
+      text, sizeof text,
+      "the most accurate setting still answers %.3f %% of rays wrongly, over --max-error %g: allow more, "
+      "or trace exactly",
+      100 * error.wrong_share(), max_error);
+  throw Failure(Exit::kLimit, file, text);
+}
+
+}  // namespace lsp
