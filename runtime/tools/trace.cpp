@@ -35,8 +35,7 @@ struct Options {
 
 void define(CLI::App& app, Options& options) {
   add_common_options(app, "lsp-trace", options.common);
-  app.add_option("FILE.lsp", options.file,
-                 "The scene: an .lsp file, or .json with instances of several (CPU alone)")
+  app.add_option("FILE.lsp", options.file, "The scene: an .lsp file, or .json with instances of several")
       ->required();
   app.add_option("--rays", options.rays, "Rays: 32 bytes each, origin, tmin, direction, tmax as float32")
       ->required();
@@ -44,7 +43,9 @@ void define(CLI::App& app, Options& options) {
                  "Hits to write: 32 bytes each, t, primitive, u, v, normal as float32 (primitive uint32), "
                  "flags uint32, from bit 8 on the instance's number")
       ->required();
-  app.add_option("--backend", options.backend, "Where to trace")->check(CLI::IsMember({"cpu", "vulkan"}));
+  app.add_option("--backend", options.backend,
+                 "Where to trace; the instances of a scene are found on the CPU either way")
+      ->check(CLI::IsMember({"cpu", "vulkan"}));
   app.add_option("--mode", options.mode,
                  "Down to triangles or by Line Spaces; without it by Line Spaces if there are any")
       ->check(CLI::IsMember({"exact", "approximate"}));

@@ -16,6 +16,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 constexpr size_t kChunkRays = 4096;
+constexpr uint32_t kAllMasks = 0xFF;
 
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
@@ -54,9 +55,8 @@ std::string cpu_name() {
 lsp_status trace_part(const TraceTarget& target, const lsp_trace_options& options,
                       std::span<const LspRay> rays, LspHit* hits, lsp_trace_counts* counts,
                       lsp_error* error) {
-  constexpr uint32_t kAll = 0xFF;
   if (target.instances != nullptr)
-    return lsp_trace_instances(target.instances, &options, kAll, rays.data(), hits, rays.size(), counts,
+    return lsp_trace_instances(target.instances, &options, kAllMasks, rays.data(), hits, rays.size(), counts,
                                error);
   return lsp_trace(target.scene, &options, rays.data(), hits, rays.size(), counts, error);
 }
@@ -113,13 +113,27 @@ TraceReport trace_on_cpu(const TraceTarget& target, const TraceRequest& request,
   return report;
 }
 
-TraceReport trace_on_vulkan(const lsp_scene& scene, const TraceRequest& request, std::span<const LspRay> rays,
-                            std::span<LspHit> hits, ProgressLine& line) {
+// Puts what is traced on the tracer's device.
+void load_target(VulkanTracer& tracer, const TraceTarget& target, const TraceRequest& request) {
+  const bool approximate = (request.options.flags & LSP_TRACE_APPROXIMATE) != 0;
+  const uint32_t uses = approximate ? LSP_USE_APPROXIMATE : LSP_USE_EXACT;
+  if (target.instances != nullptr)
+    tracer.load(std::span(target.instances->assets, target.instances->asset_count), uses, request.load_path);
+  else
+    tracer.load(*target.scene, uses, request.load_path);
+}
+
+TraceReport trace_on_vulkan(const TraceTarget& target, const TraceRequest& request,
+                            std::span<const LspRay> rays, std::span<LspHit> hits, ProgressLine& line) {
   VulkanOptions options;
   options.device = request.device;
   VulkanTracer tracer(options);
-  const bool approximate = (request.options.flags & LSP_TRACE_APPROXIMATE) != 0;
-  tracer.load(scene, approximate ? LSP_USE_APPROXIMATE : LSP_USE_EXACT, request.load_path);
+  load_target(tracer, target, request);
+  const auto trace = [&](std::span<const LspRay> from, std::span<LspHit> to, bool count = false) {
+    return target.instances != nullptr
+               ? tracer.trace_instances(*target.instances, request.options, kAllMasks, from, to, count)
+               : tracer.trace(request.options, from, to, count);
+  };
   TraceReport report;
   report.device = tracer.device_name();
   report.load_path = name_of(tracer.load_path());
@@ -127,14 +141,14 @@ TraceReport trace_on_vulkan(const lsp_scene& scene, const TraceRequest& request,
   report.load_seconds = tracer.load_seconds();
   report.bytes_imported = tracer.bytes_imported();
   report.bytes_uploaded = tracer.bytes_uploaded();
-  const VulkanTrace counted = tracer.trace(request.options, rays, hits, true);
+  const VulkanTrace counted = trace(rays, hits, true);
   report.counts = counted.counts;
   report.retraced = counted.retraced;
-  if (!rays.empty())
-    tracer.trace(request.options, rays.first(1), hits.first(1));  // compiles the shader to be timed
+  for (size_t i = 0; i < tracer.scene_count() && !rays.empty(); ++i)  // compiles the shaders to be timed
+    tracer.trace(request.options, rays.first(1), hits.first(1), false, i);
   for (uint32_t i = 0; i < request.repeats; ++i) {
     line.show((i + 1.0) / (request.repeats + 1.0));
-    const VulkanTrace timed = tracer.trace(request.options, rays, hits);
+    const VulkanTrace timed = trace(rays, hits);
     report.seconds.push_back(timed.seconds);
     report.gpu_seconds.push_back(timed.gpu_seconds);
   }
@@ -145,10 +159,8 @@ TraceReport trace_on_vulkan(const lsp_scene& scene, const TraceRequest& request,
 
 TraceReport trace_rays(const TraceTarget& target, const TraceRequest& request, std::span<const LspRay> rays,
                        std::span<LspHit> hits) {
-  if (request.vulkan && target.instances != nullptr)
-    throw Failure(Exit::kUnsupported, "", "instances are traced on the CPU alone; use --backend cpu");
   ProgressLine line(request.progress);
-  TraceReport report = request.vulkan ? trace_on_vulkan(*target.scene, request, rays, hits, line)
+  TraceReport report = request.vulkan ? trace_on_vulkan(target, request, rays, hits, line)
                                       : trace_on_cpu(target, request, rays, hits, line);
   if (report.load_path.empty())
     report.load_path = target.unpacked > 0 && target.mapped.empty() ? "unpacked" : "mapped";

@@ -44,7 +44,7 @@ struct TraceTarget {
 };
 
 // Traces `rays` into `hits`, first once with counting and without a clock, then request.repeats times timed.
-// Throws Failure: kUnsupported where instances are to be traced by Vulkan.
+// Throws Failure.
 TraceReport trace_rays(const TraceTarget& target, const TraceRequest& request, std::span<const LspRay> rays,
                        std::span<LspHit> hits);
 

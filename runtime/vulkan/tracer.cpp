@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "device.h"
+#include "instance_memory.h"
 #include "scene_buffers.h"
 
 namespace lsp {
@@ -164,37 +165,37 @@ class Shader {
   VkDescriptorPool pool_ = VK_NULL_HANDLE;
 };
 
-// The pipelines for one scene, one for each kind of trace, made when they are first needed.
+// The pipelines for the scenes on a device, one for each kind of trace, made when they are first needed.
+// Scenes of one kind share them: the stack is that of the scene that needs the largest.
 class Pipelines {
  public:
-  Pipelines(Device& device, Shader& shader, const lsp_vulkan_plan& plan, const lsp_scene& scene)
-      : device_(device),
-        shader_(shader),
-        plan_(plan),
-        stack_(std::max(scene.header->max_stack, 1u)),
-        parts_(lsp_vulkan_parts(&scene)) {}
+  Pipelines(Device& device, Shader& shader, uint32_t stack)
+      : device_(device), shader_(shader), stack_(stack) {}
   ~Pipelines() {
     for (const auto& [key, pipeline] : made_) device_.vk.vkDestroyPipeline(device_.handle, pipeline, nullptr);
   }
   Pipelines(const Pipelines&) = delete;
   Pipelines& operator=(const Pipelines&) = delete;
-  // `tables`: of cells the tables alone answer.
-  VkPipeline get(bool counting, uint32_t flags, bool tables) {
-    VkPipeline& pipeline = made_[{counting, flags, tables}];
-    if (pipeline != VK_NULL_HANDLE) return pipeline;
-    lsp_vulkan_plan plan = plan_;
+  // `parts` of the shader are needed.
+  VkPipeline get(lsp_vulkan_plan plan, bool counting, uint32_t flags, uint32_t parts) {
     if ((flags & LSP_TRACE_APPROXIMATE) == 0) plan.base_structure = plan.exact_structure;
-    return pipeline = shader_.create_pipeline(plan, counting, flags, stack_,
-                                              tables ? parts_ & ~LSP_PART_CELL_EXACT : parts_);
+    VkPipeline& pipeline = made_[{plan.base_structure, plan.addresses, counting, flags, parts}];
+    if (pipeline == VK_NULL_HANDLE) pipeline = shader_.create_pipeline(plan, counting, flags, stack_, parts);
+    return pipeline;
   }
 
  private:
   Device& device_;
   Shader& shader_;
-  lsp_vulkan_plan plan_;
   uint32_t stack_;
-  uint32_t parts_;
-  std::map<std::tuple<bool, uint32_t, bool>, VkPipeline> made_;
+  std::map<std::tuple<uint32_t, uint32_t, bool, uint32_t, uint32_t>, VkPipeline> made_;
+};
+
+// A scene on the device.
+struct Loaded {
+  lsp_scene scene{};
+  SceneBuffers buffers;
+  bool imported = false;
 };
 
 // Rays and hits of one batch. Where device and host share memory the shader works on what the host writes; on
@@ -243,12 +244,13 @@ class VulkanTracer::Impl {
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
-  void load(const lsp_scene& scene, uint32_t uses, LoadPath path);
+  // `numbered`: what fails is named by the scene's number.
+  void load(std::span<const lsp_scene* const> scenes, uint32_t uses, LoadPath path, bool numbered);
   VulkanTrace trace(const lsp_trace_options& options, std::span<const LspRay> rays, std::span<LspHit> hits,
-                    bool count);
+                    bool count, size_t scene);
 
   std::unique_ptr<Device> device;
-  std::unique_ptr<SceneBuffers> scene_buffers;
+  std::vector<Loaded> loaded;
   LoadPath load_path = LoadPath::kAutomatic;
   std::string load_note;
   double load_seconds = 0;
@@ -258,17 +260,19 @@ class VulkanTracer::Impl {
   void open();
   void close() noexcept;
   void unload() noexcept;
-  void attach(SceneBuffers&& buffers);
-  bool try_import(bool forced);
-  double trace_batch(const lsp_trace_options& options, const LspRay* rays, LspHit* hits, uint32_t count,
-                     bool counting);
-  void record_batch(const lsp_trace_options& options, uint32_t count, bool counting);
-  void retrace(const lsp_trace_options& options, std::span<const LspRay> rays, std::span<LspHit> hits,
-               bool count, VulkanTrace& result) const;
+  void load_all(std::span<const lsp_scene* const> scenes, LoadPath path, bool numbered);
+  void load_next(const lsp_scene& scene, LoadPath path);
+  bool try_import(const lsp_scene& scene, bool forced);
+  void attach(const lsp_scene& scene, SceneBuffers&& buffers, bool imported);
+  double trace_batch(const Loaded& scene, const lsp_trace_options& options, const LspRay* rays, LspHit* hits,
+                     uint32_t count, bool counting);
+  void record_batch(const Loaded& scene, const lsp_trace_options& options, uint32_t count, bool counting);
+  static void retrace(const lsp_scene& scene, const lsp_trace_options& options, std::span<const LspRay> rays,
+                      std::span<LspHit> hits, bool count, VulkanTrace& result);
 
   VulkanOptions options_;
-  lsp_scene scene_{};
   uint32_t uses_ = 0;
+  std::string name_;   // of the scene that is being loaded, before what is wrong with it
   uint32_t dial_ = 0;  // of the trace in progress; 0: it has none
   std::unique_ptr<Shader> shader_;
   std::unique_ptr<Pipelines> pipelines_;
@@ -293,61 +297,93 @@ void VulkanTracer::Impl::close() noexcept {
 
 void VulkanTracer::Impl::unload() noexcept {
   pipelines_.reset();
-  scene_buffers.reset();
+  loaded.clear();
 }
 
-// Makes `buffers` the scene and traces one ray, so that a device that cannot read them fails here.
-void VulkanTracer::Impl::attach(SceneBuffers&& buffers) {
-  scene_buffers = std::make_unique<SceneBuffers>(std::move(buffers));
-  pipelines_ = std::make_unique<Pipelines>(*device, *shader_, scene_buffers->plan(), scene_);
-  const LspHeader& header = *scene_.header;
-  const LspRay ray{header.bounds_min, 0.0f, {1.0f, 1.0f, 1.0f}, 3.402823e38f};
-  LspHit hit;
-  const uint32_t flags = (uses_ & LSP_USE_EXACT) != 0 ? 0 : LSP_TRACE_APPROXIMATE;
-  trace({flags, 0.0f, 0, 0.0f}, {&ray, 1}, {&hit, 1}, false);
-}
-
-bool VulkanTracer::Impl::try_import(bool forced) {
-  if (!forced && !device->shares_memory) {
-    load_note = "the device has memory of its own";
-    return false;
-  }
+// Adds the scene and traces one ray, so that a device that cannot read it fails here.
+void VulkanTracer::Impl::attach(const lsp_scene& scene, SceneBuffers&& buffers, bool imported) {
+  loaded.push_back({scene, std::move(buffers), imported});
   try {
-    attach(SceneBuffers::import_mapping(*device, scene_, uses_));
-    return true;
-  } catch (const DeviceLost& lost) {
-    load_note = lost.what();
-    close();
-    open();
-  } catch (const Failure& failure) {
-    load_note = failure.what();
-    unload();
+    const LspRay ray{scene.header->bounds_min, 0.0f, {1.0f, 1.0f, 1.0f}, 3.402823e38f};
+    LspHit hit;
+    const uint32_t flags = (uses_ & LSP_USE_EXACT) != 0 ? 0 : LSP_TRACE_APPROXIMATE;
+    trace({flags, 0.0f, 0, 0.0f}, {&ray, 1}, {&hit, 1}, false, loaded.size() - 1);
+  } catch (...) {
+    loaded.pop_back();
+    throw;
   }
-  if (forced) throw Failure(Exit::kUnsupported, "", "the mapping cannot be imported: " + load_note);
+}
+
+bool VulkanTracer::Impl::try_import(const lsp_scene& scene, bool forced) {
+  std::string why = "the device has memory of its own";
+  if (forced || device->shares_memory) {
+    try {
+      attach(scene, SceneBuffers::import_mapping(*device, scene, uses_), true);
+      return true;
+    } catch (const DeviceLost&) {
+      throw;
+    } catch (const Failure& failure) {
+      why = failure.what();
+    }
+  }
+  if (forced) throw Failure(Exit::kUnsupported, "", "the mapping cannot be imported: " + why);
+  if (load_note.empty()) load_note = name_ + why;
   return false;
 }
 
-void VulkanTracer::Impl::load(const lsp_scene& scene, uint32_t uses, LoadPath path) {
-  const auto start = std::chrono::steady_clock::now();
-  unload();
-  scene_ = scene;
-  uses_ = uses | device->address_uses;
-  load_note.clear();
+void VulkanTracer::Impl::load_next(const lsp_scene& scene, LoadPath path) {
   // What no way of loading can mend is said before the first is tried.
   lsp_vulkan_plan plan;
   lsp_error error;
-  const lsp_status status = lsp_vulkan_plan_buffers(&scene_, uses_, &device->limits, &plan, &error);
+  const lsp_status status = lsp_vulkan_plan_buffers(&scene, uses_, &device->limits, &plan, &error);
   if (status != LSP_OK) throw Failure(static_cast<Exit>(status), "", error.message);
-  if (path != LoadPath::kUpload && try_import(path == LoadPath::kImport)) {
-    load_path = LoadPath::kImport;
-  } else {
-    attach(SceneBuffers::upload(*device, scene_, uses_, options_.discrete));
-    load_path = LoadPath::kUpload;
+  if (path != LoadPath::kUpload && try_import(scene, path == LoadPath::kImport)) return;
+  attach(scene, SceneBuffers::upload(*device, scene, uses_, options_.discrete), false);
+}
+
+void VulkanTracer::Impl::load_all(std::span<const lsp_scene* const> scenes, LoadPath path, bool numbered) {
+  unload();
+  uint32_t stack = 1;
+  for (const lsp_scene* scene : scenes) stack = std::max(stack, scene->header->max_stack);
+  pipelines_ = std::make_unique<Pipelines>(*device, *shader_, stack);
+  loaded.reserve(scenes.size());
+  for (size_t i = 0; i < scenes.size(); ++i) {
+    name_ = numbered ? "asset " + std::to_string(i) + ": " : "";
+    try {
+      load_next(*scenes[i], path);
+    } catch (const DeviceLost&) {
+      throw;
+    } catch (const Failure& failure) {
+      unload();
+      throw Failure(failure.exit(), failure.file(), name_ + failure.what());
+    }
   }
+}
+
+void VulkanTracer::Impl::load(std::span<const lsp_scene* const> scenes, uint32_t uses, LoadPath path,
+                              bool numbered) {
+  const auto start = std::chrono::steady_clock::now();
+  uses_ = uses | device->address_uses;
+  load_note.clear();
+  try {
+    load_all(scenes, path, numbered);
+  } catch (const DeviceLost& lost) {
+    // An import may cost the device: on a new one everything is a copy.
+    if (path == LoadPath::kUpload) throw;
+    close();
+    open();
+    load_note = name_ + lost.what();
+    if (path == LoadPath::kImport)
+      throw Failure(Exit::kUnsupported, "", name_ + "the mapping cannot be imported: " + lost.what());
+    load_all(scenes, LoadPath::kUpload, numbered);
+  }
+  const bool imported = std::ranges::any_of(loaded, &Loaded::imported);
+  load_path = imported ? LoadPath::kImport : LoadPath::kUpload;
   load_seconds = seconds_since(start);
 }
 
-void VulkanTracer::Impl::record_batch(const lsp_trace_options& options, uint32_t count, bool counting) {
+void VulkanTracer::Impl::record_batch(const Loaded& scene, const lsp_trace_options& options, uint32_t count,
+                                      bool counting) {
   constexpr VkPipelineStageFlagBits kCompute = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT;
   constexpr VkPipelineStageFlags kTransfer = VK_PIPELINE_STAGE_TRANSFER_BIT;
   const auto& vk = device->vk;
@@ -367,9 +403,11 @@ void VulkanTracer::Impl::record_batch(const lsp_trace_options& options, uint32_t
     vk.vkCmdWriteTimestamp(commands, kCompute, shader_->timer, 0);
   }
   const lsp_vulkan_trace_constants constants{options.lod, 0, count, dial_};
+  uint32_t parts = lsp_vulkan_parts(&scene.scene);
+  if (dial_ == LSP_DIAL_TABLES) parts &= ~LSP_PART_CELL_EXACT;  // of cells the tables alone answer
   lsp_vulkan_record_trace(&device->functions, commands,
-                          pipelines_->get(counting, options.flags, dial_ == LSP_DIAL_TABLES), shader_->layout,
-                          shader_->set, &constants);
+                          pipelines_->get(scene.buffers.plan(), counting, options.flags, parts),
+                          shader_->layout, shader_->set, &constants);
   if (shader_->timer != VK_NULL_HANDLE) vk.vkCmdWriteTimestamp(commands, kCompute, shader_->timer, 1);
   if (batch_.staged()) {
     record_barrier(*device, commands, kCompute, VK_ACCESS_SHADER_WRITE_BIT, kTransfer,
@@ -382,11 +420,11 @@ void VulkanTracer::Impl::record_batch(const lsp_trace_options& options, uint32_t
 }
 
 // Returns the seconds in the shader.
-double VulkanTracer::Impl::trace_batch(const lsp_trace_options& options, const LspRay* rays, LspHit* hits,
-                                       uint32_t count, bool counting) {
+double VulkanTracer::Impl::trace_batch(const Loaded& scene, const lsp_trace_options& options,
+                                       const LspRay* rays, LspHit* hits, uint32_t count, bool counting) {
   memcpy(batch_.rays.mapped(), rays, size_t{count} * sizeof(LspRay));
   if (counting) memset(counters_.mapped(), 0, sizeof(lsp_trace_counts));
-  record_batch(options, count, counting);
+  record_batch(scene, options, count, counting);
   device->submit_and_wait(shader_->commands, shader_->fence);
   memcpy(hits, batch_.hits.mapped(), size_t{count} * sizeof(LspHit));
   if (shader_->timer == VK_NULL_HANDLE) return 0;
@@ -397,14 +435,15 @@ double VulkanTracer::Impl::trace_batch(const lsp_trace_options& options, const L
   return static_cast<double>(ticks[1] - ticks[0]) * device->seconds_per_tick;
 }
 
-void VulkanTracer::Impl::retrace(const lsp_trace_options& options, std::span<const LspRay> rays,
-                                 std::span<LspHit> hits, bool count, VulkanTrace& result) const {
+void VulkanTracer::Impl::retrace(const lsp_scene& scene, const lsp_trace_options& options,
+                                 std::span<const LspRay> rays, std::span<LspHit> hits, bool count,
+                                 VulkanTrace& result) {
   for (size_t i = 0; i < hits.size(); ++i) {
     if ((hits[i].flags & LSP_HIT_INCOMPLETE) == 0) continue;
     lsp_trace_counts counts{};
     lsp_error error;
     const lsp_status status =
-        lsp_trace(&scene_, &options, &rays[i], &hits[i], 1, count ? &counts : nullptr, &error);
+        lsp_trace(&scene, &options, &rays[i], &hits[i], 1, count ? &counts : nullptr, &error);
     if (status != LSP_OK) throw Failure(static_cast<Exit>(status), "", error.message);
     ++result.retraced;
     lsp_add_counts(&result.counts, &counts);
@@ -412,21 +451,21 @@ void VulkanTracer::Impl::retrace(const lsp_trace_options& options, std::span<con
 }
 
 VulkanTrace VulkanTracer::Impl::trace(const lsp_trace_options& wanted, std::span<const LspRay> rays,
-                                      std::span<LspHit> hits, bool count) {
+                                      std::span<LspHit> hits, bool count, size_t number) {
+  const uint32_t needed = (wanted.flags & LSP_TRACE_APPROXIMATE) != 0 ? LSP_USE_APPROXIMATE : LSP_USE_EXACT;
+  if (number >= loaded.size() || (uses_ & needed) != needed)
+    throw Failure(Exit::kUnsupported, "", "the scene is not loaded for this kind of trace");
+  if (hits.size() != rays.size()) throw Failure(Exit::kInternal, "", "as many hits as rays are needed");
+  const Loaded& scene = loaded[number];
   // Flags that have no meaning together make no pipeline of their own.
   lsp_trace_options options = wanted;
   options.flags &= (wanted.flags & LSP_TRACE_APPROXIMATE) != 0 ? LSP_TRACE_ALL_FLAGS : LSP_TRACE_ANY_HIT;
   if ((options.flags & LSP_TRACE_NEAR_APPROXIMATE) != 0) options.flags &= ~LSP_TRACE_NEAR_SKIP;
   dial_ = 0;
-  if (scene_.header != nullptr && (scene_.header->required_features & LSP_FEATURE_CELLS) != 0) {
+  if ((scene.scene.header->required_features & LSP_FEATURE_CELLS) != 0) {
     options.flags &= LSP_TRACE_APPROXIMATE | LSP_TRACE_ANY_HIT;
-    if ((options.flags & LSP_TRACE_APPROXIMATE) != 0) dial_ = lsp_dial(&scene_, &wanted);
+    if ((options.flags & LSP_TRACE_APPROXIMATE) != 0) dial_ = lsp_dial(&scene.scene, &wanted);
   }
-  const uint32_t needed = (options.flags & LSP_TRACE_APPROXIMATE) != 0 ? LSP_USE_APPROXIMATE : LSP_USE_EXACT;
-  if (scene_buffers == nullptr || (uses_ & needed) != needed) {
-    throw Failure(Exit::kUnsupported, "", "the scene is not loaded for this kind of trace");
-  }
-  if (hits.size() != rays.size()) throw Failure(Exit::kInternal, "", "as many hits as rays are needed");
   const auto start = std::chrono::steady_clock::now();
   VulkanTrace result;
   const uint32_t most = std::min(lsp_vulkan_max_rays(&device->limits), kBatchRays);
@@ -435,16 +474,16 @@ VulkanTrace VulkanTracer::Impl::trace(const lsp_trace_options& wanted, std::span
     batch_ = {};  // before the new ones are made, not after
     batch_ = BatchBuffers(*device, capacity);
   }
-  lsp_vulkan_write_descriptors(&device->functions, device->handle, shader_->set, &scene_buffers->plan(),
-                               scene_buffers->handles(), batch_.shader_rays(), batch_.shader_hits(),
+  lsp_vulkan_write_descriptors(&device->functions, device->handle, shader_->set, &scene.buffers.plan(),
+                               scene.buffers.handles(), batch_.shader_rays(), batch_.shader_hits(),
                                counters_.handle());
-  if (scene_buffers->plan().addresses != 0) {
+  if (scene.buffers.plan().addresses != 0) {
     lsp_vulkan_write_address_table(&device->functions, device->handle, shader_->set,
-                                   scene_buffers->addresses());
+                                   scene.buffers.addresses());
   }
   for (size_t first = 0; first < rays.size(); first += most) {
     const auto size = static_cast<uint32_t>(std::min<size_t>(rays.size() - first, most));
-    result.gpu_seconds += trace_batch(options, &rays[first], &hits[first], size, count);
+    result.gpu_seconds += trace_batch(scene, options, &rays[first], &hits[first], size, count);
     if (count) {
       lsp_trace_counts counts;
       memcpy(&counts, counters_.mapped(), sizeof counts);
@@ -453,7 +492,7 @@ VulkanTrace VulkanTracer::Impl::trace(const lsp_trace_options& wanted, std::span
     ++result.batches;
   }
   options.flags |= wanted.flags & LSP_TRACE_MAX_LOSS;
-  retrace(options, rays, hits, count, result);
+  retrace(scene.scene, options, rays, hits, count, result);
   result.counts.rays = rays.size();  // those retraced are not counted twice
   result.seconds = seconds_since(start);
   return result;
@@ -467,22 +506,32 @@ VulkanTracer::VulkanTracer(VulkanTracer&&) noexcept = default;
 VulkanTracer& VulkanTracer::operator=(VulkanTracer&&) noexcept = default;
 
 void VulkanTracer::load(const lsp_scene& scene, uint32_t uses, LoadPath path) {
-  impl_->load(scene, uses, path);
+  const lsp_scene* const scenes[] = {&scene};
+  impl_->load(scenes, uses, path, false);
+}
+
+void VulkanTracer::load(std::span<const lsp_scene* const> assets, uint32_t uses, LoadPath path) {
+  impl_->load(assets, uses, path, true);
 }
 
 VulkanTrace VulkanTracer::trace(const lsp_trace_options& options, std::span<const LspRay> rays,
-                                std::span<LspHit> hits, bool count) {
-  return impl_->trace(options, rays, hits, count);
+                                std::span<LspHit> hits, bool count, size_t scene) {
+  return impl_->trace(options, rays, hits, count, scene);
 }
 
+size_t VulkanTracer::scene_count() const { return impl_->loaded.size(); }
 const std::string& VulkanTracer::device_name() const { return impl_->device_name; }
 LoadPath VulkanTracer::load_path() const { return impl_->load_path; }
 const std::string& VulkanTracer::load_note() const { return impl_->load_note; }
 uint64_t VulkanTracer::bytes_imported() const {
-  return impl_->scene_buffers == nullptr ? 0 : impl_->scene_buffers->bytes_imported();
+  uint64_t sum = 0;
+  for (const Loaded& scene : impl_->loaded) sum += scene.buffers.bytes_imported();
+  return sum;
 }
 uint64_t VulkanTracer::bytes_uploaded() const {
-  return impl_->scene_buffers == nullptr ? 0 : impl_->scene_buffers->bytes_uploaded();
+  uint64_t sum = 0;
+  for (const Loaded& scene : impl_->loaded) sum += scene.buffers.bytes_uploaded();
+  return sum;
 }
 double VulkanTracer::load_seconds() const { return impl_->load_seconds; }
 

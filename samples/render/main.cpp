@@ -226,8 +226,7 @@ int main(int argc, char** argv) {
   CommonOptions common;
   Arguments a;
   add_common_options(app, kProgram, common);
-  app.add_option("FILE.lsp", a.file,
-                 "The baked scene: an .lsp file, or .json with instances of several (CPU alone)")
+  app.add_option("FILE.lsp", a.file, "The baked scene: an .lsp file, or .json with instances of several")
       ->required();
   app.add_option("-o,--output", a.outputs,
                  "The picture: .png (tone-mapped) or .pfm (linear floats); may be given twice")
@@ -257,7 +256,9 @@ int main(int argc, char** argv) {
   app.add_option("--sun", a.sun, "Direction towards the sun");
   app.add_option("--exposure", a.exposure, "Stops to brighten a .png by (default 0)")
       ->check(CLI::Range(-20.0f, 20.0f));
-  app.add_option("--backend", a.backend, "Where rays are traced (default cpu)")
+  app.add_option("--backend", a.backend,
+                 "Where rays are traced (default cpu); the instances of a scene are found on the CPU "
+                 "either way")
       ->check(CLI::IsMember({"cpu", "vulkan"}));
   app.add_option("--threads", a.options.threads, "Threads of the CPU (default: all)")
       ->check(CLI::Range(1, 1024));

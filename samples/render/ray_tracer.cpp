@@ -41,17 +41,24 @@ class CpuTracer : public RayTracer {
 
 class VulkanRayTracer : public RayTracer {
  public:
-  VulkanRayTracer(const lsp_scene& scene, uint32_t uses) { tracer_.load(scene, uses); }
+  VulkanRayTracer(const RenderScene& scene, uint32_t uses) : instances_(scene.instances()) {
+    if (instances_ == nullptr)
+      tracer_.load(*scene.single(), uses);
+    else
+      tracer_.load(std::span(instances_->assets, instances_->asset_count), uses);
+  }
 
   double trace(const lsp_trace_options& options, std::span<const LspRay> rays,
                std::span<LspHit> hits) override {
     if (rays.empty()) return 0;
-    return tracer_.trace(options, rays, hits).seconds;
+    if (instances_ == nullptr) return tracer_.trace(options, rays, hits).seconds;
+    return tracer_.trace_instances(*instances_, options, 0xFF, rays, hits).seconds;
   }
   std::string device() const override { return tracer_.device_name(); }
   std::string load_path() const override { return name_of(tracer_.load_path()); }
 
  private:
+  const lsp_instances* instances_;  // null: there is one file
   VulkanTracer tracer_;
 };
 
@@ -62,11 +69,11 @@ std::unique_ptr<RayTracer> make_cpu_tracer(const RenderScene& scene, int threads
 }
 
 std::unique_ptr<RayTracer> make_vulkan_tracer(const RenderScene& scene, uint32_t uses) {
-  if (scene.single() == nullptr) {
-    throw Failure(Exit::kUnsupported, scene.path(),
-                  "instances are traced on the CPU alone; use --backend cpu");
+  try {
+    return std::make_unique<VulkanRayTracer>(scene, uses);
+  } catch (const Failure& failure) {
+    throw Failure(failure.exit(), scene.path(), failure.what());
   }
-  return std::make_unique<VulkanRayTracer>(*scene.single(), uses);
 }
 
 }  // namespace lsp::sample

@@ -24,7 +24,7 @@ class RayTracer {
 
 // `threads` 0: all. The scene must outlive the tracer. Throws lsp::Failure.
 std::unique_ptr<RayTracer> make_cpu_tracer(const RenderScene& scene, int threads);
-// `uses`: LSP_USE_*. Throws lsp::Failure (kUnsupported) where there is no Vulkan device, and for instances.
+// `uses`: LSP_USE_*. Throws lsp::Failure (kUnsupported) where there is no Vulkan device.
 std::unique_ptr<RayTracer> make_vulkan_tracer(const RenderScene& scene, uint32_t uses);
 
 }  // namespace lsp::sample

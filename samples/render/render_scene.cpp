@@ -44,6 +44,10 @@ void RenderScene::add_asset(const SceneFile& file, const std::string& path) {
   find_materials(asset, path == path_ ? "" : path + ": ");
 }
 
+const lsp_instances* RenderScene::instances() const {
+  return instanced_ == nullptr ? nullptr : &instanced_->instances().view();
+}
+
 glm::vec3 RenderScene::lo() const {
   if (instanced_ == nullptr) return to_glm(file_->header().bounds_min);
   if (instance_count() == 0) return glm::vec3(0.0f);

@@ -55,6 +55,8 @@ class RenderScene {
   const lsp_scene* single() const { return file_ ? &file_->scene() : nullptr; }
   // Of every file.
   const std::vector<const LspHeader*>& headers() const { return headers_; }
+  // The instances; nullptr: there is one file.
+  const lsp_instances* instances() const;
   glm::vec3 lo() const;
   glm::vec3 hi() const;
   float diagonal() const { return glm::length(hi() - lo()); }

@@ -1,8 +1,8 @@
 // A Vulkan device of one's own that traces files: for programs without an engine around them.
 //
 // An engine has its device already and uses lsp_vulkan.h. This helper is what lsp-trace, lsp-render,
-// lsp-bench and the tests share: it finds a device, puts a scene on it by import or by upload, and traces
-// batches of rays.
+// lsp-bench and the tests share: it finds a device, puts scenes on it by import or by upload, and traces
+// batches of rays, through instances, too.
 #pragma once
 
 #include <memory>
@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "lsp/lsp.h"
+#include "lsp/lsp_instances.h"
 #include "lsp/lsp_vulkan.h"
 
 namespace lsp {
@@ -32,14 +32,17 @@ struct VulkanOptions {
 };
 
 struct VulkanTrace {
-  double seconds = 0;      // wall clock, copies of rays and hits included
-  double gpu_seconds = 0;  // in the shader, by the device's timestamps; 0 where it has none
-  uint64_t retraced = 0;   // rays that the device cut short, traced again on the CPU
-  uint32_t batches = 0;
+  double seconds = 0;         // wall clock, copies of rays and hits included
+  double gpu_seconds = 0;     // in the shader, by the device's timestamps; 0 where it has none
+  uint64_t retraced = 0;      // rays that the device cut short, traced again on the CPU
+  uint64_t batches = 0;       // dispatches
+  uint64_t rounds = 0;        // of trace_instances: times that rays went on to their next instance
   lsp_trace_counts counts{};  // rays and, if asked for, the rest
 };
 
-// One device with at most one scene on it. Not for use by several threads at once. Every function throws
+struct InstanceMemory;
+
+// One device with one scene on it, or several. Not for use by several threads at once. Every function throws
 // lsp::Failure: kUnsupported without a device or a feature of it, kLimit where a limit of the device is in
 // the way, kInternal where Vulkan fails.
 class VulkanTracer {
@@ -57,14 +60,25 @@ class VulkanTracer {
   // they are the buffer, and rays that the device cuts short are traced from them.
   void load(const lsp_scene& scene, uint32_t uses, LoadPath path = LoadPath::kAutomatic);
 
+  // Puts several on it, as the assets of instances: each once, however many instances it has. Failures name
+  // the asset by its number.
+  void load(std::span<const lsp_scene* const> assets, uint32_t uses, LoadPath path = LoadPath::kAutomatic);
+
   // Traces `rays` into `hits`, of the same size. Counting uses a second, slower shader.
   VulkanTrace trace(const lsp_trace_options& options, std::span<const LspRay> rays, std::span<LspHit> hits,
-                    bool count = false);
+                    bool count = false, size_t scene = 0);
 
+  // As lsp_trace_instances, with its bits, of instances whose assets are loaded, in their order. This thread
+  // finds the instances that rays come to and moves rays there; the device traces rays of one asset together.
+  // The instances may be others, or elsewhere, every time.
+  VulkanTrace trace_instances(const lsp_instances& instances, const lsp_trace_options& options, uint32_t mask,
+                              std::span<const LspRay> rays, std::span<LspHit> hits, bool count = false);
+
+  size_t scene_count() const;  // that are loaded
   const std::string& device_name() const;
-  LoadPath load_path() const;            // of the loaded scene: kImport or kUpload
-  const std::string& load_note() const;  // why an automatic load did not import, empty if it did
-  uint64_t bytes_imported() const;       // of the mapping, 0 after an upload
+  LoadPath load_path() const;            // kImport where a scene was imported, else kUpload
+  const std::string& load_note() const;  // why an automatic load did not import all, empty if it did
+  uint64_t bytes_imported() const;       // of the mappings, 0 after an upload
   uint64_t bytes_uploaded() const;
   double load_seconds() const;  // wall clock of load, the first dispatch included
   // What the validation layer has said so far; empty is clean. Without options.validation always empty.
@@ -73,6 +87,7 @@ class VulkanTracer {
  private:
   class Impl;
   std::unique_ptr<Impl> impl_;
+  std::unique_ptr<InstanceMemory> instance_memory_;
 };
 
 }  // namespace lsp
