@@ -68,7 +68,8 @@ Exit run(Arguments a) {
 
 int main(int argc, char** argv) {
   Arguments a;
-  CLI::App app("Bakes meshes (.gltf .glb .obj .ply .stl .off) into an .lsp file, or several.", "lsp-bake");
+  CLI::App app("Bakes meshes (.gltf .glb .obj .ply .stl .off) into an .lsp file, or into a scene of several.",
+               "lsp-bake");
   app.option_defaults()->always_capture_default();
   app.add_option("INPUT", a.inputs, "Mesh files, read in this order")->required();
   app.add_option("-o,--output", a.output, "The .lsp file to write; with --instances the scene, .json")

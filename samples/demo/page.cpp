@@ -38,8 +38,26 @@ double speed_up(const Figures& f, const nlohmann::json& approximate) {
 
 bool has_cells(const Figures& f) { return f.bake.contains("cells") && !f.bake.at("cells").is_null(); }
 
+bool has_tables(const Figures& f) { return has_cells(f) || number(f.bake, "line_spaces") > 0; }
+
 // What the tables are called.
 const char* tables_of(const Figures& f) { return has_cells(f) ? "tables of cells" : "Line Spaces"; }
+
+// What the two pictures are.
+std::string introduction(const Figures& f) {
+  std::string html =
+      "<p>The same picture twice, with the same random numbers. What the eye sees and direct light are "
+      "traced exactly "
+      "in both; indirect light (what arrives over another surface, or as a reflection, and the shadow rays "
+      "there) is traced exactly in one and ";
+  if (!has_tables(f))
+    return html +
+           "would be looked up in tables in the other, but none pays here, as the bake says below: the file "
+           "holds the tree for exact rays alone, and both pictures are exact.</p>\n";
+  return html + "looked up in " + tables_of(f) + " in the other: <strong>" +
+         format("%.2f times the rays a second", speed_up(f, f.approximate)) + "</strong>, " +
+         psnr(f.compare) + " apart.</p>\n";
+}
 
 // A row of the table: a name and the two pictures' values.
 std::string row(const char* name, const std::string& exact, const std::string& approximate) {
@@ -58,7 +76,7 @@ std::string list(const nlohmann::json& items) {
 
 // The qualities side by side; nothing where there is but one.
 std::string dial(const Figures& f) {
-  if (f.others.empty()) return "";
+  if (f.others.empty() || !has_tables(f)) return "";
   std::string html =
       "<h2>The dial</h2>\n<p>The same file at other qualities: where tables lose more than the quality "
       "allows, a cell "
@@ -153,16 +171,8 @@ std::string make_page(const Figures& f, const Pictures& pictures) {
   std::string html =
       "<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n<title>lsp: " +
-      title + "</title>\n<style>" + kStyle + "</style>\n<main>\n<h1>Indirect light from " + tables_of(f) +
-      ": " + title + "</h1>\n";
-  html +=
-      "<p>The same picture twice, with the same random numbers. What the eye sees and direct light are "
-      "traced exactly "
-      "in both; indirect light (what arrives over another surface, or as a reflection, and the shadow rays "
-      "there) is traced exactly in one and looked up in " +
-      std::string(tables_of(f)) + " in the other: <strong>" +
-      format("%.2f times the rays a second", speed_up(f, f.approximate)) + "</strong>, " + psnr(f.compare) +
-      " apart.</p>\n";
+      title + "</title>\n<style>" + kStyle + "</style>\n<main>\n<h1>Indirect light from " +
+      (has_tables(f) ? tables_of(f) : "exact rays") + ": " + title + "</h1>\n" + introduction(f);
   html +=
       "<div class=\"slide\"><img alt=\"exact\" src=\"" + exact +
       "\"><img class=\"over\" alt=\"approximate\" src=\"" + approximate +
@@ -212,6 +222,8 @@ std::string make_page(const Figures& f, const Pictures& pictures) {
     html += fact("cells",
                  format("%d x %d x %d", grid.at(0).get<int>(), grid.at(1).get<int>(), grid.at(2).get<int>()));
     html += fact("of them filled", format("%.0f", number(cells, "filled")));
+  } else if (!has_tables(f)) {
+    html += fact("tables", "none");
   } else {
     html += fact("Line Spaces", format("%.0f", number(f.bake, "line_spaces")));
     html += fact("shafts filled", format("%.0f %%", 100 * number(f.bake, "filled_shafts") /
@@ -240,7 +252,8 @@ std::string make_page(const Figures& f, const Pictures& pictures) {
 std::string make_summary(const Figures& f) {
   std::string text;
   const std::string tables = has_cells(f) ? format("%.0f filled cells", number(f.bake.at("cells"), "filled"))
-                                          : format("%.0f Line Spaces", number(f.bake, "line_spaces"));
+                             : has_tables(f) ? format("%.0f Line Spaces", number(f.bake, "line_spaces"))
+                                             : "no tables";
   text += format("bake:        %.0f triangles, %s, %s, %.2f s\n", number(f.bake.at("triangles"), "kept"),
                  tables.c_str(), megabytes(number(f.bake, "file_bytes")).c_str(),
                  total_seconds(f.bake.at("seconds")));

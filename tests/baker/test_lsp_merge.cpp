@@ -67,8 +67,9 @@ class LspMerge : public ::testing::Test {
   // Bakes in one, and in `count` shards, of which the last are given first.
   void expect_the_one_bake(const std::string& mesh_and_options, int count) {
     SCOPED_TRACE(mesh_and_options + ", " + std::to_string(count) + " shards");
-    if (!fs::exists(folder_ / "one.lsp"))
+    if (!fs::exists(folder_ / "one.lsp")) {
       ASSERT_EQ(shell("lsp-bake --quiet -o one.lsp " + mesh_and_options), 0) << read("err");
+    }
     std::string parts;
     for (int i = 1; i <= count; ++i) {
       const std::string number = std::to_string(i), part = number + ".part";

@@ -90,6 +90,16 @@ TEST(Page, TellsOfCellsAndTheirDial) {
   EXPECT_NE(make_summary(figures).find("fast:        4.50 times"), std::string::npos);
 }
 
+TEST(Page, SaysWhereThereAreNoTables) {
+  Figures figures = example();
+  figures.bake["line_spaces"] = 0;
+  figures.bake["shafts"] = figures.bake["filled_shafts"] = 0;
+  const std::string page = make_page(figures, {});
+  EXPECT_NE(page.find("both pictures are exact"), std::string::npos);
+  EXPECT_EQ(page.find("Line Spaces"), std::string::npos);
+  EXPECT_NE(make_summary(figures).find("no tables"), std::string::npos);
+}
+
 TEST(Page, MissingFigureIsReported) {
   Figures figures = example();
   figures.bake.erase("shafts");
