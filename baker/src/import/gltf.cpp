@@ -187,8 +187,9 @@ class GltfReader {
   }
 
   void place_all(int node, const glm::dmat4& world) {
+    const std::vector<GltfPrimitive>& list = primitives(node);
     const tinygltf::Value* attributes = instancing(node);
-    if (!attributes) return place_mesh(node, world);
+    if (!attributes) return place_mesh(node, list, world);
     const auto read = [&](const char* name, int components) {
       const tinygltf::Value& accessor = attributes->Get(name);
       return accessor.IsInt() ? accessors_.floats(accessor.Get<int>(), components) : std::vector<float>();
@@ -203,13 +204,13 @@ class GltfReader {
     const uint64_t count = instances(node);
     for (uint64_t i = 0; i < count; ++i) {
       const glm::dmat4 own = gltf_matrix(slice(translation, i, 3), slice(rotation, i, 4), slice(scale, i, 3));
-      place_mesh(node, world * own);
+      place_mesh(node, list, world * own);
     }
   }
 
-  void place_mesh(int node, const glm::dmat4& world) {
-    if (instances_) return add_instance(node, world);
-    for (const GltfPrimitive& primitive : primitives(node))
+  void place_mesh(int node, const std::vector<GltfPrimitive>& list, const glm::dmat4& world) {
+    if (instances_) return add_instance(node, list, world);
+    for (const GltfPrimitive& primitive : list)
       place(primitive, world, model_.nodes[size_t(node)].skin, builder_, primitive.material);
   }
 
@@ -222,8 +223,7 @@ class GltfReader {
     auto operator<=>(const AssetKey&) const = default;
   };
 
-  void add_instance(int node, const glm::dmat4& world) {
-    const std::vector<GltfPrimitive>& list = primitives(node);
+  void add_instance(int node, const std::vector<GltfPrimitive>& list, const glm::dmat4& world) {
     if (list.empty()) return;
     const int skin = model_.nodes[size_t(node)].skin;
     const auto posed = std::count_if(list.begin(), list.end(),
