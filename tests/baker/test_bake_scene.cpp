@@ -130,7 +130,8 @@ void BakeScene::expect_the_hits_of_one_bake(const std::string& inputs, double re
     moved.back().origin.z += float(origin[2] - scene.origin()[2]);
   }
   std::vector<LspHit> expected(rays.size()), hits(rays.size());
-  ASSERT_EQ(lsp_trace(&one.scene(), nullptr, rays.data(), expected.data(), rays.size(), nullptr, nullptr),
+  const lsp_trace_options exact = {0, 0, 0, 0};
+  ASSERT_EQ(lsp_trace(&one.scene(), &exact, rays.data(), expected.data(), rays.size(), nullptr, nullptr),
             LSP_OK);
   scene.instances().trace({0, 0}, 255, moved, hits);
   size_t both = 0, different = 0;
