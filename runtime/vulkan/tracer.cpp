@@ -462,6 +462,8 @@ VulkanTrace VulkanTracer::Impl::trace(const lsp_trace_options& wanted, std::span
   options.flags &= (wanted.flags & LSP_TRACE_APPROXIMATE) != 0 ? LSP_TRACE_ALL_FLAGS : LSP_TRACE_ANY_HIT;
   if ((options.flags & LSP_TRACE_NEAR_APPROXIMATE) != 0) options.flags &= ~LSP_TRACE_NEAR_SKIP;
   dial_ = 0;
+  // Wide nodes alone answer every ray exactly: the same pipeline.
+  if (scene.scene.header->base_structure == LSP_BASE_WIDE) options.flags &= LSP_TRACE_ANY_HIT;
   if ((scene.scene.header->required_features & LSP_FEATURE_CELLS) != 0) {
     options.flags &= LSP_TRACE_APPROXIMATE | LSP_TRACE_ANY_HIT;
     if ((options.flags & LSP_TRACE_APPROXIMATE) != 0) dial_ = lsp_dial(&scene.scene, &wanted);
