@@ -19,11 +19,14 @@ uint64_t table_bytes(const Baked& baked) {
 bool weigh_tables(Baked& baked) {
   constexpr Gain kWorth = {1.05, 0.97};  // at least, of both
   if (double(table_bytes(baked) + kTablePadding) > kTableShare * double(exact_bytes(baked))) {
-    leave_out_tables(baked, "of so small a mesh, they would be more than three times its exact data");
+    leave_out_tables(baked,
+                     "of so small a mesh, they would be more than three times its exact data (--base cells "
+                     "asks for them)");
     return true;
   }
   if (baked.gain.vulkan < kWorth.vulkan || baked.gain.cpu < kWorth.cpu) {
-    leave_out_tables(baked, "a ray through them would take as long as an exact one");
+    leave_out_tables(baked,
+                     "a ray through them would take as long as an exact one (--base cells asks for them)");
     return true;
   }
   return false;

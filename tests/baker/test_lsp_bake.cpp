@@ -131,14 +131,15 @@ TEST_F(LspBake, SmallThingsStaySmall) {
     }
     EXPECT_EQ(bytes.tables, 0u);
     EXPECT_EQ(report["skipped"][0],
-              "tables: of so small a mesh, they would be more than three times its exact data");
+              "tables: of so small a mesh, they would be more than three times its exact data (--base cells "
+              "asks for them)");
     EXPECT_LT(bytes.file, 4096u) << "mostly padding";
     EXPECT_TRUE(report["error"].is_null()) << "every ray is exact";
   }
   // Here a cell's loss is everywhere, and rays leave soon.
   ASSERT_EQ(run("grid.obj -o b.lsp --preset fast --json"), 0) << read("err");
   EXPECT_EQ(nlohmann::json::parse(read("out"))["skipped"][0],
-            "tables: a ray through them would take as long as an exact one");
+            "tables: a ray through them would take as long as an exact one (--base cells asks for them)");
   ASSERT_EQ(run("two.obj -o b.lsp --base cells --json"), 0) << read("err");
   EXPECT_GT(bytes_of(nlohmann::json::parse(read("out"))).tables, 0u) << "asked for";
 }
