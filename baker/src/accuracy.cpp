@@ -7,15 +7,6 @@
 
 namespace lsp {
 
-uint64_t table_bytes(const Baked& baked) {
-  const SectionArrays arrays{baked};
-  uint64_t bytes = 0;
-#define LSP_ARRAY_SECTION(Name, TYPE, code, Element, flag, base, feature, owed, member, ...) \
-  if ((feature) == LSP_FEATURE_CELLS) bytes += uint64_t{arrays.member.size()} * sizeof(Element);
-#include "lsp/sections.def"
-  return bytes;
-}
-
 bool weigh_tables(Baked& baked) {
   constexpr Gain kWorth = {1.05, 0.97};  // at least, of both
   if (double(table_bytes(baked) + kTablePadding) > kTableShare * double(exact_bytes(baked))) {

@@ -20,9 +20,6 @@ struct Accuracy {
 // The bytes that tables may take when they are weighed, in those of the exact data.
 constexpr double kTableShare = 3;
 
-// Of what depends on the grid of cells.
-uint64_t table_bytes(const Baked& baked);
-
 // Leaves the tables out where they are longer than that, or where a ray through them, by the gain that the
 // dial measured, takes as long as an exact one. Answers whether it did.
 bool weigh_tables(Baked& baked);

@@ -284,7 +284,8 @@ void leave_out_tables(Baked& baked, const std::string& reason) {
   h.base_structure = LSP_BASE_WIDE;
   h.required_features = (h.required_features & ~LSP_FEATURE_CELLS) | LSP_FEATURE_WIDE | LSP_FEATURE_WIDE_BASE;
   set_counts(baked);
-  baked.skipped = {"tables: " + reason};
+  std::erase_if(baked.skipped, [](const std::string& s) { return s.starts_with("empty cells: "); });
+  baked.skipped.insert(baked.skipped.begin(), "tables: " + reason);
 }
 
 }  // namespace lsp

@@ -129,6 +129,9 @@ constexpr uint64_t kTablePadding = 8 << 12;
 // Bytes of what exact rays need and hits are shaded by: triangles, normals, materials, nodes.
 uint64_t exact_bytes(const Baked& baked);
 
+// Bytes of what depends on the grid of cells.
+uint64_t table_bytes(const Baked& baked);
+
 // A number for people: 1,234,567.
 std::string with_commas(uint64_t n);
 

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "bake_file.h"
+#include "figures.h"
 #include "import/instances.h"
 #include "import/source_file.h"
 #include "lsp/instances.hpp"
@@ -215,15 +216,16 @@ class SceneBake {
       std::printf("origin      %.17g %.17g %.17g: instances, rays and hits are relative to it\n",
                   scene_.origin.x, scene_.origin.y, scene_.origin.z);
     for (const Json& report : reports_)
-      std::printf("asset       %s: %s triangles, %.2f MB, %s instances\n",
+      std::printf("asset       %s: %s triangles, %s, %s instances\n",
                   report["output"].get_ref<const std::string&>().c_str(),
-                  with_commas(report["triangles"]["kept"]).c_str(), report["file_bytes"].get<double>() / 1e6,
+                  with_commas(report["triangles"]["kept"]).c_str(),
+                  size_text(report["file_bytes"].get<uint64_t>()).c_str(),
                   with_commas(report["instances"]).c_str());
     std::printf("time        import %.2f s, assets %.2f s\n", import_seconds_, bake_seconds_);
-    std::printf("wrote       %s: %s instances of %s assets, %s triangles for %s, %.2f MB\n",
-                a_.output.c_str(), with_commas(scene_.instances.size()).c_str(),
-                with_commas(reports_.size()).c_str(), with_commas(totals_.stored).c_str(),
-                with_commas(totals_.placed).c_str(), double(totals_.bytes) / 1e6);
+    std::printf("wrote       %s: %s instances of %s assets, %s triangles for %s, %s\n", a_.output.c_str(),
+                with_commas(scene_.instances.size()).c_str(), with_commas(reports_.size()).c_str(),
+                with_commas(totals_.stored).c_str(), with_commas(totals_.placed).c_str(),
+                size_text(totals_.bytes).c_str());
     std::fflush(stdout);
   }
 

@@ -32,6 +32,15 @@ uint64_t exact_bytes(const Baked& baked) {
          baked.materials.size() * sizeof(LspMaterial) + baked.wide.nodes.size() * sizeof(LspWideNode);
 }
 
+uint64_t table_bytes(const Baked& baked) {
+  const SectionArrays arrays{baked};
+  uint64_t bytes = 0;
+#define LSP_ARRAY_SECTION(Name, TYPE, code, Element, flag, base, feature, owed, member, ...) \
+  if ((feature) == LSP_FEATURE_CELLS) bytes += uint64_t{arrays.member.size()} * sizeof(Element);
+#include "lsp/sections.def"
+  return bytes;
+}
+
 void set_counts(Baked& baked) {
   LspHeader& h = baked.header;
   format::set_counters(h, SectionArrays{baked});

@@ -77,18 +77,18 @@ CellTables fill_tables(BakeJob& job, const CellTableOptions& options) {
                           options, job.stage("cells"));
 }
 
-// Bytes that the tables will take, about: as those of some cells from all over the scene do.
+// Bytes that the tables will take, about: as those of some cells from all over the scene do, which are the
+// bake's meanwhile.
 double estimate_tables(BakeJob& job) {
   constexpr size_t kSample = 64;
-  const CellGrid& grid = job.baked.cell_grid;
+  Baked& baked = job.baked;
+  const size_t cells = baked.cell_grid.cells.size();
   CellTableOptions options = job.options.cell_tables;
-  options.shard = {1, uint32_t(std::max<size_t>(1, grid.cells.size() / kSample))};
-  const CellTables t = fill_tables(job, options);
-  const size_t bytes = t.cells.size() * sizeof(LspFilledCell) + t.entries.size() * 4 +
-                       t.planes.size() * (sizeof(LspPlane) + 4) + t.splits.size() * sizeof(LspSplit) +
-                       t.nodes.size() * sizeof(LspCellNode) + t.references.size() * 4;
-  const double cells = double(grid.cells.size()) / double(std::max<size_t>(1, t.cells.size()));
-  return double(grid.words.size() * 4) + double(bytes) * cells;
+  options.shard = {1, uint32_t(std::max<size_t>(1, cells / kSample))};
+  baked.cell_tables = fill_tables(job, options);
+  const double words = double(baked.cell_grid.words.size() * sizeof(uint32_t));
+  const double filled = double(std::max<size_t>(1, baked.cell_tables.cells.size()));
+  return words + (double(table_bytes(baked)) - words) * (double(cells) / filled);
 }
 
 // A grid so coarse that its tables take no more than they may, or nearly: they grow with the square of the
