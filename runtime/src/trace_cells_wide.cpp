@@ -260,7 +260,8 @@ struct Tracer {
     return select(hn::RebindMask(du, hn::Eq(face_in, face_out)), set_u(LSP_NONE), entry_of);
   }
 
-  // The loop of lsp_advance, once, up to the entry of a filled cell. kFirst: in cells that rays begin in.
+  // The loop of lsp_advance, once, up to the entry of a filled cell; kFirst: what lsp_begin does in the cells
+  // that rays begin in.
   template <bool kFirst>
   HWY_INLINE void advance(size_t i, size_t end_of_lanes) {
     const V3 o = load_3(origin_, i), d = load_3(direction_, i), inverse = load_3(inverse_, i);

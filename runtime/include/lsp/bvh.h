@@ -140,7 +140,7 @@ LSP_STEP void lsp_test_leaf(LspScene scene, LspSetup s) {
   lsp_walk.ref = LSP_NONE;
 }
 
-LSP_STEP LspBest lsp_end() {
+LSP_STEP LspBest lsp_end(LspScene) {
   lsp_walk.best.complete = lsp_stack_ref[0] == LSP_NONE;
   return lsp_walk.best;
 }

@@ -80,33 +80,6 @@ LSP_FN vec3 lsp_cell_corner(ivec3 cell) { return vec3(float(cell.x), float(cell.
 /* Rays from afar are treated as others. */
 LSP_FN bool lsp_is_far(LspScene, LspSetup) { return false; }
 
-/* To the first cell of the ray. */
-LSP_STEP void lsp_begin(LspScene scene, LspSetup s, LspQuery q) {
-  LspCellGrid grid = lsp_load_header(scene).cells;
-  LspCellRay r = lsp_cell_ray(grid, s);
-  vec3 dims = vec3(float(grid.cells_x), float(grid.cells_y), float(grid.cells_z));
-  precise vec3 a = (vec3(0.0f, 0.0f, 0.0f) - r.origin) * r.inverse;
-  precise vec3 b = (dims - r.origin) * r.inverse;
-  vec3 first = vec3(lsp_min(a.x, b.x), lsp_min(a.y, b.y), lsp_min(a.z, b.z));
-  vec3 last = vec3(lsp_max(a.x, b.x), lsp_max(a.y, b.y), lsp_max(a.z, b.z));
-  float t_in = lsp_max(lsp_max(first.x, first.y), first.z);
-  bool outside = t_in > s.tmin;
-  lsp_walk.t_last = lsp_min(lsp_min(lsp_min(last.x, last.y), last.z), s.tmax);
-  lsp_walk.t = outside ? t_in : s.tmin;
-  lsp_walk.axis = !outside ? -1 : (t_in == first.x ? 0 : (t_in == first.y ? 1 : 2));
-  vec3 p = lsp_cell_point(r, lsp_walk.t); /* of a damaged file perhaps no number: then 0 is the larger */
-  lsp_walk.cell = ivec3(int(lsp_min(lsp_max(0.0f, p.x), dims.x - 0.5f)), int(lsp_min(lsp_max(0.0f, p.y), dims.y - 0.5f)),
-                 int(lsp_min(lsp_max(0.0f, p.z), dims.z - 0.5f)));
-  lsp_walk.ref = lsp_walk.t < lsp_walk.t_last ? 0u : LSP_NONE;
-  lsp_walk.exact_cell = lsp_walk.cell;
-  lsp_walk.exact_t = lsp_walk.t;
-  lsp_walk.step = 0u;
-  lsp_walk.best = lsp_no_best(s);
-  lsp_walk.any_hit = (q.flags & LSP_TRACE_ANY_HIT) != 0u;
-  lsp_walk.counts = lsp_no_counts();
-  lsp_stack_ref[0] = lsp_walk.ref;
-}
-
 /* The patch of a coordinate that counts in patches, n of them, and the place in it, from -1 to 1. */
 LSP_FN float lsp_cell_patch(float q, float n) {
   float i = floor(q > 0.0f ? q : 0.0f);
@@ -228,101 +201,154 @@ LSP_FN int lsp_cell_within(float p, int cell, int jump) {
   return int(i > lo ? (i < hi ? i : hi) : lo); /* of a NaN lo */
 }
 
+/* A ray's passage of a cell, of an empty one with the cells around it that it may jump over: to where, by which side. */
+struct LspCellPassage {
+  vec3 to;
+  float t_out;
+  int axis_out;
+  ivec3 next; /* the cell behind */
+};
+LSP_FN LspCellPassage lsp_cell_pass(LspCellRay r, ivec3 cell, int jump, float t) {
+  ivec3 side = cell + r.ahead * (1 + 2 * jump) - ivec3(jump, jump, jump);
+  precise vec3 t_side = (lsp_cell_corner(side) - r.origin) * r.inverse;
+  LspCellPassage pass;
+  pass.axis_out = t_side.x <= t_side.y ? (t_side.x <= t_side.z ? 0 : 2) : (t_side.y <= t_side.z ? 1 : 2);
+  pass.t_out = lsp_max(lsp_along(t_side, pass.axis_out), t);
+  pass.to = lsp_cell_point(r, pass.t_out);
+  ivec3 next = side + r.ahead - ivec3(1, 1, 1);
+  pass.next = ivec3(pass.axis_out == 0 ? next.x : lsp_cell_within(pass.to.x, cell.x, jump),
+                    pass.axis_out == 1 ? next.y : lsp_cell_within(pass.to.y, cell.y, jump),
+                    pass.axis_out == 2 ? next.z : lsp_cell_within(pass.to.z, cell.z, jump));
+  return pass;
+}
+
+/* What a filled cell's entry says of a ray that passes it from t to t_out. Answers whether the ray is over: it has its
+ * hit, or leaves the scene. Otherwise it goes on, or is to be traced exactly here first, if lsp_walk.ref says so. */
+LSP_STEP bool lsp_cell_answer(LspScene scene, LspSetup s, LspQuery q, LspCellRay r, uint index, uint entry,
+                              LspCellLook look, ivec3 cell, bool begins, float t, float t_out) {
+  lsp_walk.counts.shafts += 1u;
+  uint answer = entry & LSP_ANSWER_MASK;
+  bool exactly = (LSP_PARTS & LSP_PART_CELL_EXACT) != 0u && (entry >> LSP_LOSS_SHIFT) >= (begins ? q.dial & 0xFFu : q.dial >> 8u);
+  bool over = answer == LSP_ANSWER_SKY;
+  if (!exactly && answer < LSP_ANSWER_LIMIT) {
+    LspFilledCell answers = lsp_load_cell_answers(scene, index);
+    lsp_walk.counts.splits += answer < answers.plane_count ? 0u : 1u;
+    uint plane = lsp_cell_plane(scene, answers, answer, look);
+    if (plane != LSP_NONE) {
+      precise vec3 origin = r.origin - (lsp_cell_corner(cell) + 0.5f);
+      float hit = lsp_cell_meet(lsp_load_plane(scene, plane), origin, r.direction, begins, s.tmin, t, t_out);
+      if (hit > s.tmin && hit < s.tmax) {
+        over = true;
+        if ((LSP_PARTS & LSP_PART_COVERAGE) != 0u) {
+          LspTriangle tri = lsp_load_triangle(scene, lsp_load_plane_record(scene, plane));
+          if (lsp_has_gaps(tri)) {
+            /* As a Line Space's candidate that is there in part: the cell is traced exactly; from tables
+             * alone the ray either meets the plane or goes on to the next cell. */
+            exactly = (LSP_PARTS & LSP_PART_CELL_EXACT) != 0u && q.dial != LSP_DIAL_TABLES;
+            over = !exactly && !lsp_passes(s, tri);
+          }
+        }
+        if (over) {
+          lsp_walk.best.t = hit;
+          lsp_walk.best.triangle = plane;
+          lsp_walk.best.flags = LSP_HIT_LINE_SPACE | (begins ? LSP_HIT_ORIGIN_INSIDE : 0u);
+        }
+      }
+    }
+  }
+  if (exactly) {
+    lsp_walk.ref = index | LSP_LEAF_BIT;
+    lsp_walk.exact_cell = cell;
+    lsp_walk.exact_t = t;
+  }
+  return over && !exactly;
+}
+
+/* To the first cell of the ray; where it begins in it, through it. Only here origin tables are asked: apart from the loop
+ * over the others, which a device runs through with all its invocations. */
+LSP_STEP void lsp_begin(LspScene scene, LspSetup s, LspQuery q) {
+  LspCellGrid grid = lsp_load_header(scene).cells;
+  LspCellRay r = lsp_cell_ray(grid, s);
+  vec3 dims = vec3(float(grid.cells_x), float(grid.cells_y), float(grid.cells_z));
+  precise vec3 a = (vec3(0.0f, 0.0f, 0.0f) - r.origin) * r.inverse;
+  precise vec3 b = (dims - r.origin) * r.inverse;
+  vec3 first = vec3(lsp_min(a.x, b.x), lsp_min(a.y, b.y), lsp_min(a.z, b.z));
+  vec3 last = vec3(lsp_max(a.x, b.x), lsp_max(a.y, b.y), lsp_max(a.z, b.z));
+  float t_in = lsp_max(lsp_max(first.x, first.y), first.z);
+  bool outside = t_in > s.tmin;
+  lsp_walk.t_last = lsp_min(lsp_min(lsp_min(last.x, last.y), last.z), s.tmax);
+  lsp_walk.t = outside ? t_in : s.tmin;
+  lsp_walk.axis = !outside ? -1 : (t_in == first.x ? 0 : (t_in == first.y ? 1 : 2));
+  vec3 p = lsp_cell_point(r, lsp_walk.t); /* of a damaged file perhaps no number: then 0 is the larger */
+  lsp_walk.cell = ivec3(int(lsp_min(lsp_max(0.0f, p.x), dims.x - 0.5f)), int(lsp_min(lsp_max(0.0f, p.y), dims.y - 0.5f)),
+                 int(lsp_min(lsp_max(0.0f, p.z), dims.z - 0.5f)));
+  lsp_walk.ref = lsp_walk.t < lsp_walk.t_last ? 0u : LSP_NONE;
+  lsp_walk.exact_cell = lsp_walk.cell;
+  lsp_walk.exact_t = lsp_walk.t;
+  lsp_walk.step = 0u;
+  lsp_walk.best = lsp_no_best(s);
+  lsp_walk.any_hit = (q.flags & LSP_TRACE_ANY_HIT) != 0u;
+  lsp_walk.counts = lsp_no_counts();
+  lsp_stack_ref[0] = lsp_walk.ref;
+  ivec3 cell = lsp_walk.cell;
+  if (outside || lsp_walk.ref == LSP_NONE) return;
+  lsp_walk.step = 1u;
+  lsp_walk.counts.nodes = 1u;
+  uint word = lsp_load_cell_word(scene, (uint(cell.z) * grid.cells_y + uint(cell.y)) * grid.cells_x + uint(cell.x));
+  bool filled = (word & LSP_CELL_FILLED) != 0u;
+  LspCellPassage pass = lsp_cell_pass(r, cell, filled ? 0 : int(word & LSP_CELL_MAX_JUMP), lsp_walk.t);
+  if (filled) {
+    uint index = word & ~LSP_CELL_FILLED;
+    vec3 corner = lsp_cell_corner(cell);
+    uint face_out = 2u * uint(pass.axis_out) + lsp_ahead(r, pass.axis_out);
+    LspCellLook look = lsp_cell_origin(scene, grid, index, p - corner, pass.to - corner, pass.axis_out, face_out);
+    /* Where no surface is near its beginning there is no origin table: nobody knows what the far one loses. */
+    uint loss = look.entry == LSP_NONE ? LSP_LOSS_UNKNOWN << LSP_LOSS_SHIFT : 0u;
+    if (look.entry == LSP_NONE) look = lsp_cell_through(grid, index, r, cell, pass.to - corner, pass.axis_out, face_out);
+    uint entry = LSP_ANSWER_EMPTY;
+    if (look.entry != LSP_NONE) entry = lsp_load_entry(scene, look.entry);
+    bool over = lsp_cell_answer(scene, s, q, r, index, entry | loss, look, cell, true, lsp_walk.t, pass.t_out);
+    if (over) lsp_stack_ref[0] = LSP_NONE;
+    if (over) lsp_walk.ref = LSP_NONE;
+  }
+  lsp_walk.cell = pass.next;
+  lsp_walk.t = pass.t_out;
+  lsp_walk.axis = pass.axis_out;
+}
+
 /* From cell to cell until a table answers, or a cell is to be traced exactly, or the ray is over. */
 LSP_STEP void lsp_advance(LspScene scene, LspSetup s, LspQuery q) {
   LspCellGrid grid = lsp_load_header(scene).cells;
   LspCellRay r = lsp_cell_ray(grid, s);
-  ivec3 cell = lsp_walk.cell;
-  float t = lsp_walk.t;
-  int axis = lsp_walk.axis;
-  uint step = lsp_walk.step;
   uint most = grid.cells_x + grid.cells_y + grid.cells_z;
-  uint exact = LSP_NONE;
   bool over = lsp_walk.best.triangle != LSP_NONE;
-  while (!over && exact == LSP_NONE && step < most) {
+  uint before = lsp_walk.step;
+  while (!over && lsp_walk.ref == 0u && lsp_walk.step < most) {
+    ivec3 cell = lsp_walk.cell;
+    float t = lsp_walk.t;
     over = !(t < lsp_walk.t_last) || uint(cell.x) >= grid.cells_x || uint(cell.y) >= grid.cells_y || uint(cell.z) >= grid.cells_z;
     if (over) break;
-    ++step;
+    lsp_walk.step += 1u;
     uint word = lsp_load_cell_word(scene, (uint(cell.z) * grid.cells_y + uint(cell.y)) * grid.cells_x + uint(cell.x));
     bool filled = (word & LSP_CELL_FILLED) != 0u;
-    int jump = filled ? 0 : int(word & LSP_CELL_MAX_JUMP);
-    ivec3 side = cell + r.ahead * (1 + 2 * jump) - ivec3(jump, jump, jump);
-    precise vec3 t_side = (lsp_cell_corner(side) - r.origin) * r.inverse;
-    int axis_out = t_side.x <= t_side.y ? (t_side.x <= t_side.z ? 0 : 2) : (t_side.y <= t_side.z ? 1 : 2);
-    float t_out = lsp_max(lsp_along(t_side, axis_out), t);
-    vec3 point = lsp_cell_point(r, t_out);
+    LspCellPassage pass = lsp_cell_pass(r, cell, filled ? 0 : int(word & LSP_CELL_MAX_JUMP), t);
     if (filled) {
-      lsp_walk.counts.shafts += 1u;
       uint index = word & ~LSP_CELL_FILLED;
-      bool begins = axis < 0;
       vec3 corner = lsp_cell_corner(cell);
-      vec3 from = lsp_cell_point(r, t) - corner;
-      uint face_out = 2u * uint(axis_out) + lsp_ahead(r, axis_out);
-      LspCellLook look;
-      if (begins)
-        look = lsp_cell_origin(scene, grid, index, from, point - corner, axis_out, face_out);
-      else
-        look = lsp_cell_far(grid, index, from, point - corner, axis, 2u * uint(axis) + 1u - lsp_ahead(r, axis), axis_out, face_out);
-      /* Where no surface is near its beginning there is no origin table: nobody knows what the far one loses. */
-      bool unknown = begins && look.entry == LSP_NONE;
-      if (unknown) look = lsp_cell_through(grid, index, r, cell, point - corner, axis_out, face_out);
+      LspCellLook look = lsp_cell_far(grid, index, lsp_cell_point(r, t) - corner, pass.to - corner, lsp_walk.axis,
+                                      2u * uint(lsp_walk.axis) + 1u - lsp_ahead(r, lsp_walk.axis), pass.axis_out,
+                                      2u * uint(pass.axis_out) + lsp_ahead(r, pass.axis_out));
       uint entry = LSP_ANSWER_EMPTY;
       if (look.entry != LSP_NONE) entry = lsp_load_entry(scene, look.entry);
-      if (unknown) entry |= LSP_LOSS_UNKNOWN << LSP_LOSS_SHIFT;
-      uint answer = entry & LSP_ANSWER_MASK;
-      if ((LSP_PARTS & LSP_PART_CELL_EXACT) != 0u && (entry >> LSP_LOSS_SHIFT) >= (begins ? q.dial & 0xFFu : q.dial >> 8u)) {
-        exact = index;
-        lsp_walk.exact_cell = cell;
-        lsp_walk.exact_t = t;
-      } else if (answer < LSP_ANSWER_LIMIT) {
-        LspFilledCell answers = lsp_load_cell_answers(scene, index);
-        lsp_walk.counts.splits += answer < answers.plane_count ? 0u : 1u;
-        uint plane = lsp_cell_plane(scene, answers, answer, look);
-        if (plane != LSP_NONE) {
-          precise vec3 origin = r.origin - (corner + 0.5f);
-          float hit = lsp_cell_meet(lsp_load_plane(scene, plane), origin, r.direction, begins, s.tmin, t, t_out);
-          if (hit > s.tmin && hit < s.tmax) {
-            uint record = lsp_load_plane_record(scene, plane);
-            over = true;
-            if ((LSP_PARTS & LSP_PART_COVERAGE) != 0u) {
-              LspTriangle tri = lsp_load_triangle(scene, record);
-              if (lsp_has_gaps(tri)) {
-                /* As a Line Space's candidate that is there in part: the cell is traced exactly; from tables
-                 * alone the ray either meets the plane or goes on to the next cell. */
-                bool exactly = (LSP_PARTS & LSP_PART_CELL_EXACT) != 0u && q.dial != LSP_DIAL_TABLES;
-                over = !exactly && !lsp_passes(s, tri);
-                if (exactly) {
-                  exact = index;
-                  lsp_walk.exact_cell = cell;
-                  lsp_walk.exact_t = t;
-                }
-              }
-            }
-            if (over) {
-              lsp_walk.best.t = hit;
-              lsp_walk.best.triangle = record;
-              lsp_walk.best.flags = LSP_HIT_LINE_SPACE | (begins ? LSP_HIT_ORIGIN_INSIDE : 0u);
-            }
-          }
-        }
-      } else {
-        over = answer == LSP_ANSWER_SKY;
-      }
+      over = lsp_cell_answer(scene, s, q, r, index, entry, look, cell, false, t, pass.t_out);
     }
-    ivec3 next = cell + r.ahead * (2 + 2 * jump) - ivec3(jump + 1, jump + 1, jump + 1);
-    cell = ivec3(axis_out == 0 ? next.x : lsp_cell_within(point.x, cell.x, jump),
-                 axis_out == 1 ? next.y : lsp_cell_within(point.y, cell.y, jump),
-                 axis_out == 2 ? next.z : lsp_cell_within(point.z, cell.z, jump));
-    t = t_out;
-    axis = axis_out;
+    lsp_walk.cell = pass.next;
+    lsp_walk.t = pass.t_out;
+    lsp_walk.axis = pass.axis_out;
   }
-  lsp_walk.counts.nodes += step - lsp_walk.step;
-  lsp_walk.cell = cell;
-  lsp_walk.t = t;
-  lsp_walk.axis = axis;
-  lsp_walk.step = step;
-  lsp_walk.ref = exact == LSP_NONE ? LSP_NONE : exact | LSP_LEAF_BIT;
+  lsp_walk.counts.nodes += lsp_walk.step - before;
   if (over) lsp_stack_ref[0] = LSP_NONE;
+  if (lsp_walk.ref == 0u) lsp_walk.ref = LSP_NONE;
 }
 
 /* Where a ray enters a box of a cell's tree, not before t_first; infinity where it misses it up to t_last. `unit` is
@@ -396,7 +422,9 @@ LSP_STEP void lsp_test_leaf(LspScene scene, LspSetup s) {
 /* Look-ups are made on the way. */
 LSP_STEP void lsp_look_up(LspScene, LspSetup, LspQuery) {}
 
-LSP_STEP LspBest lsp_end() {
+LSP_STEP LspBest lsp_end(LspScene scene) {
   lsp_walk.best.complete = lsp_stack_ref[0] == LSP_NONE;
+  /* So far a table's answer is a plane. */
+  if ((lsp_walk.best.flags & LSP_HIT_LINE_SPACE) != 0u) lsp_walk.best.triangle = lsp_load_plane_record(scene, lsp_walk.best.triangle);
   return lsp_walk.best;
 }

@@ -715,7 +715,7 @@ LSP_STEP LspTraced lsp_trace_ready(LspScene scene, LspSetup s, LspQuery q, LspRa
     }
   }
   LspTraced traced;
-  traced.hit = lsp_finish(scene, s, ray, lsp_end());
+  traced.hit = lsp_finish(scene, s, ray, lsp_end(scene));
   traced.counts = lsp_walk.counts;
   traced.valid = true;
   return traced;

@@ -214,7 +214,7 @@ LSP_STEP void lsp_test_leaf(LspScene scene, LspSetup s) {
 /* There are no tables. */
 LSP_STEP void lsp_look_up(LspScene, LspSetup, LspQuery) {}
 
-LSP_STEP LspBest lsp_end() {
+LSP_STEP LspBest lsp_end(LspScene) {
   lsp_walk.best.complete = lsp_stack_ref[0] == LSP_NONE;
   return lsp_walk.best;
 }
