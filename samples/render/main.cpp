@@ -28,6 +28,7 @@ struct Arguments {
   std::string size = "960x540";
   std::string backend = "cpu";
   std::string sun;
+  float verify_percent = 0.0f;
   float exposure = 0.0f;
   RenderOptions options;
 };
@@ -107,6 +108,7 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
   options.effect = parse_effect(arguments.effect);
   const bool approximate = arguments.mode == "approximate";
   options.indirect = to_trace_options(arguments.trace, approximate);
+  if (approximate) options.verify = arguments.verify_percent / 100.0f;
   parse_size(arguments.size, options);
   for (const std::string& output : arguments.outputs) {
     const std::filesystem::path ending = std::filesystem::path(output).extension();
@@ -128,6 +130,10 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
       std::cerr << program << ": " << arguments.file << ": " << note << "\n";
     for (const std::string& note : unused_arguments(arguments.trace, approximate, scene.headers()))
       std::cerr << program << ": " << arguments.file << ": " << note << "\n";
+    if (arguments.verify_percent > 0 && (!approximate || !arguments.heat.empty())) {
+      std::cerr << program << ": " << arguments.file << ": --verify does nothing: "
+                << (approximate ? "--heat shows rays as they are" : "rays are exact") << "\n";
+    }
     const bool tables = std::ranges::any_of(scene.headers(), [](const LspHeader* header) {
       return (header->required_features & (LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS)) != 0;
     });
@@ -198,6 +204,8 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
                                         {"indirect_rays", report.indirect_rays},
                                         {"indirect_seconds", report.indirect_seconds},
                                         {"indirect_mrays_per_second", rate},
+                                        {"paths", report.paths},
+                                        {"verified_paths", report.verified_paths},
                                         {"mean_luminance", report.mean_luminance}}
                      .dump(2)
               << "\n";
@@ -242,6 +250,11 @@ int main(int argc, char** argv) {
   app.add_option("--mode", a.mode, "How indirect rays are traced (default exact)")
       ->check(CLI::IsMember({"exact", "approximate"}));
   add_trace_arguments(app, a.trace);
+  app.add_option(
+         "--verify", a.verify_percent,
+         "Approximate: share of indirect paths that are traced exactly, too, and correct the others, "
+         "in per cent: errors become noise, the mean of many samples is the exact picture (default 0)")
+      ->check(CLI::Range(0.0f, 100.0f));
   app.add_option("--camera", a.camera,
                  "X,Y,Z:X,Y,Z:FOV, the vertical angle in degrees (default: from the scene)");
   app.add_option("--size", a.size, "In pixels (default 960x540)");
@@ -268,7 +281,7 @@ int main(int argc, char** argv) {
         {"FILE.lsp", "--output FILE", "--effect", "--mode", "--camera EYE:TARGET:ANGLE", "--samples"}},
        {"The picture", {"--size WxH", "--exposure STOPS", "--denoise", "--heat"}},
        {"Light", {"--bounces", "--radius", "--sun X,Y,Z"}},
-       {"Approximate mode", {"--near", "--lod", "--quality", "--max-loss PERCENT"}},
+       {"Approximate mode", {"--near", "--lod", "--quality", "--max-loss PERCENT", "--verify PERCENT"}},
        {"The machine", {"--backend", "--threads"}}});
   return run_program(kProgram, app, argc, argv, [&] { run(a, common, kProgram); });
 }

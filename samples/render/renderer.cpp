@@ -47,6 +47,10 @@ enum Dimension : uint32_t {
   kDiffuseDirection = kDirectFirst + 4,
   kPathLightFirst,  // three of the diffuse path, then three of the glossy one
   kDimensionsPerBounce = 12,
+  // Far from every bounce's: whether a path is verified says nothing about where it goes.
+  kVerifyDiffuse = 0x40000,
+  kVerifyGlossy,
+  kVerifyOcclusion,
 };
 
 struct Surface {
@@ -60,6 +64,7 @@ struct Path {
   uint32_t item;
   bool glossy;  // its first ray left along a reflection
   glm::vec3 throughput;
+  float weight = 1.0f;  // of all that it brings; see Verification
 };
 
 // A ray that brings `radiance` to its item unless something is in its way.
@@ -67,6 +72,16 @@ struct LightRay {
   uint32_t item;
   Component component;
   glm::vec3 radiance;
+  float weight = 1.0f;
+};
+
+// Approximate light A and exact light E of a path that is verified with probability p count as
+// A + (E - A) / p = (1 - 1 / p) A + (1 / p) E, of one that is not as A: on average p E + (1 - p) A + p A - A
+// = E.
+struct Verification {
+  float share;
+  float approximate() const { return 1.0f - 1.0f / share; }
+  float exact() const { return 1.0f / share; }
 };
 
 class Renderer {
@@ -202,11 +217,20 @@ class Renderer {
     return sobol_point(sample_, seed);
   }
 
-  // Called by one thread at a time, in the order of the batch: the sums do not depend on threads.
-  void add(uint32_t item, Component component, glm::vec3 radiance) {
+  // Called by one thread at a time, in the order of the batch: the sums do not depend on threads. What is cut
+  // is the light, before it is weighted: a cut correction would not have the right mean.
+  void add(uint32_t item, Component component, glm::vec3 radiance, float weight = 1.0f) {
     const float largest = std::max({radiance.x, radiance.y, radiance.z});
     if (!(largest > 0) || !std::isfinite(largest)) return;
-    now_[component][item] += largest > kLargestSample ? radiance * (kLargestSample / largest) : radiance;
+    now_[component][item] +=
+        weight * (largest > kLargestSample ? radiance * (kLargestSample / largest) : radiance);
+  }
+
+  // Whether what starts at `item` is verified: by a hash, not by a point of the sequence, whose points are
+  // spread over a pixel's samples in step with those that say where the path goes.
+  bool verifies(uint32_t item, Dimension dimension) const {
+    const uint32_t seed = hash_combine(hash_combine(order_[first_ + item], sample_), dimension);
+    return static_cast<float>(hash_mix(seed) >> 8) * 0x1p-24f < options_.verify;
   }
 
   bool wants(Effect effect) const { return options_.effect == effect || options_.effect == Effect::kAll; }
@@ -266,7 +290,22 @@ class Renderer {
       rays_[i] = ray_from(s.point, above(s.point, direction), reach);
       light_[i] = {s.item, kSmooth, glm::vec3(1.0f)};
     });
+    std::vector<LspRay> verified_rays;
+    std::vector<LightRay> verified_light;
+    const Verification verification{options_.verify};
+    for (size_t i = 0; i < light_.size(); ++i) {
+      if (!verifies(light_[i].item, kVerifyOcclusion)) continue;
+      verified_rays.push_back(rays_[i]);
+      verified_light.push_back(light_[i]);
+      verified_light.back().weight = verification.exact();
+      light_[i].weight = verification.approximate();
+    }
+    report_.paths += light_.size();
+    report_.verified_paths += verified_light.size();
     trace_light(options_.indirect, true);
+    rays_ = std::move(verified_rays);
+    light_ = std::move(verified_light);
+    trace_light({}, true);
   }
 
   // Light from sky, sun and emitters at the surfaces the eye sees.
@@ -302,7 +341,33 @@ class Renderer {
       const Surface& s = surfaces_[surface_of_item_[paths_[i].item]];
       path_rays_[i] = i < diffuse ? start_diffuse(s, paths_[i]) : start_glossy(s, paths_[i]);
     });
-    for (int bounce = 0; bounce < options_.bounces; ++bounce) follow_paths(bounce);
+    report_.paths += paths_.size();
+    choose_verified();
+    follow_paths(options_.indirect);
+    paths_.swap(verified_);
+    path_rays_.swap(verified_rays_);
+    report_.verified_paths += paths_.size();
+    follow_paths({});
+  }
+
+  // Copies the paths to verify with their first rays, and weights both.
+  void choose_verified() {
+    verified_.clear();
+    verified_rays_.clear();
+    const Verification verification{options_.verify};
+    for (size_t i = 0; i < paths_.size(); ++i) {
+      Path& path = paths_[i];
+      if (!verifies(path.item, path.glossy ? kVerifyGlossy : kVerifyDiffuse)) continue;
+      verified_.push_back(path);
+      verified_.back().weight = verification.exact();
+      verified_rays_.push_back(path_rays_[i]);
+      path.weight = verification.approximate();
+    }
+  }
+
+  void follow_paths(const lsp_trace_options& options) {
+    for (int bounce = 0; bounce < options_.bounces && !paths_.empty(); ++bounce)
+      follow_bounce(options, bounce);
   }
 
   LspRay start_diffuse(const Surface& s, Path& path) const {
@@ -350,10 +415,10 @@ class Renderer {
     return ray_from(s.point, above(s.point, direction), kInfinity);
   }
 
-  void follow_paths(int bounce) {
+  void follow_bounce(const lsp_trace_options& options, int bounce) {
     path_hits_.resize(path_rays_.size());
     report_.indirect_rays += path_rays_.size();
-    report_.indirect_seconds += tracer_.trace(options_.indirect, path_rays_, path_hits_);
+    report_.indirect_seconds += tracer_.trace(options, path_rays_, path_hits_);
 
     // Paths that met a surface go on; the others end in the sky.
     points_.resize(paths_.size());
@@ -366,11 +431,12 @@ class Renderer {
       const bool mirrored = path.glossy && bounce == 0;
       if (!std::isfinite(path_hits_[i].t)) {
         if (mirrored)
-          add(path.item, kMirrored, path.throughput * sky_.radiance(to_glm(path_rays_[i].direction)));
+          add(path.item, kMirrored, path.throughput * sky_.radiance(to_glm(path_rays_[i].direction)),
+              path.weight);
         continue;
       }
       // What a diffuse surface gets straight from an emitter is direct light already.
-      if (mirrored) add(path.item, kMirrored, path.throughput * points_[i].emission);
+      if (mirrored) add(path.item, kMirrored, path.throughput * points_[i].emission, path.weight);
       paths_[kept] = path;
       points_[kept] = points_[i];
       ++kept;
@@ -387,10 +453,10 @@ class Renderer {
       path.throughput *= points_[i].base_color;
       const Component component = path.glossy ? kMirrored : kSmooth;
       make_light_rays(i, path.item, points_[i], path.throughput, first + (path.glossy ? 3u : 0u), component,
-                      component);
+                      component, path.weight);
     });
     end_light();
-    trace_light(options_.indirect, true);
+    trace_light(options, true);
 
     if (bounce + 1 == options_.bounces) return;
     path_rays_.resize(kept);
@@ -422,14 +488,16 @@ class Renderer {
   }
 
   // Fills the slots of point `index`: a ray to the sky, one to the sun, to an emitter, to the lamp; a slot
-  // whose light is black makes no ray. `weight`: what the point passes on of arriving light, albedo included.
+  // whose light is black makes no ray. `weight`: what the point passes on of arriving light, albedo included;
+  // `path_weight`: how much what arrives counts.
   void make_light_rays(size_t index, uint32_t item, const SurfacePoint& p, glm::vec3 weight,
-                       uint32_t dimension, Component component, Component sun_component) {
+                       uint32_t dimension, Component component, Component sun_component,
+                       float path_weight = 1.0f) {
     LightRay* slot = &slots_[kLightSlots * index];
     LspRay* ray = &slot_rays_[kLightSlots * index];
     for (size_t i = 0; i < kLightSlots; ++i) {
       const bool small = i == kSun || i == kLamp;
-      slot[i] = {item, small ? sun_component : component, glm::vec3(0.0f)};
+      slot[i] = {item, small ? sun_component : component, glm::vec3(0.0f), path_weight};
     }
 
     const glm::vec3 toward_sky = above(p, cosine_direction(p.shading_normal, random(item, dimension)));
@@ -527,7 +595,8 @@ class Renderer {
     (indirect ? report_.indirect_rays : report_.shadow_rays) += rays_.size();
     (indirect ? report_.indirect_seconds : report_.shadow_seconds) += seconds;
     for (size_t i = 0; i < light_.size(); ++i) {
-      if (!std::isfinite(hits_[i].t)) add(light_[i].item, light_[i].component, light_[i].radiance);
+      if (!std::isfinite(hits_[i].t))
+        add(light_[i].item, light_[i].component, light_[i].radiance, light_[i].weight);
     }
   }
 
@@ -559,6 +628,8 @@ class Renderer {
   std::vector<uint32_t> surface_of_item_;
   std::vector<Path> paths_;
   std::vector<LspRay> path_rays_;
+  std::vector<Path> verified_;
+  std::vector<LspRay> verified_rays_;
   std::vector<LspHit> path_hits_;
   std::vector<SurfacePoint> points_;
   std::vector<LightRay> slots_;

@@ -6,6 +6,9 @@
 //                                        +--> one diffuse ray, by mode --+--> shadow rays   (diffuse)
 //                                        +--> one glossy ray, by mode  --+    by mode       (glossy)
 //                                        +--> one short any-hit ray, by mode                (ao)
+//
+// "Errors as noise": a share p of what starts by mode is followed a second time, exactly, with the same
+// random numbers, and its light becomes approximate + (exact - approximate) / p. Its mean is the exact light.
 #pragma once
 
 #include <functional>
@@ -21,6 +24,7 @@ enum class Effect { kDirect, kAmbientOcclusion, kDiffuse, kGlossy, kAll };
 struct RenderOptions {
   Effect effect = Effect::kAll;
   lsp_trace_options indirect{};  // what indirect rays are traced with
+  float verify = 0.0f;           // share of indirect paths that are traced exactly, too, and correct the mean
   int width = 960;
   int height = 540;
   uint32_t samples = 16;
@@ -40,6 +44,8 @@ struct RenderReport {
   double shadow_seconds = 0;
   uint64_t indirect_rays = 0;
   double indirect_seconds = 0;
+  uint64_t paths = 0;           // that start by mode: diffuse, glossy or of ambient occlusion
+  uint64_t verified_paths = 0;  // of them those that were traced exactly, too
   double mean_luminance = 0;
 };
 

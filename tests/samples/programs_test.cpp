@@ -3,8 +3,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "compare.h"
@@ -159,6 +161,73 @@ TEST_F(Programs, VulkanGivesTheSamePicture) {
     render("spheres", "cpu", std::string("--mode ") + mode);
     render("spheres", "vulkan", std::string("--backend vulkan --mode ") + mode);
     EXPECT_EQ(read(file("cpu.pfm")), read(file("vulkan.pfm"))) << mode;
+  }
+}
+
+// A hall in tables so coarse that the picture by tables alone is far off: with a share of its paths verified
+// its mean comes to the exact one's, and the rest is noise that goes as samples come.
+TEST_F(Programs, VerifiedPathsMakeTheMeanExact) {
+  ASSERT_EQ(run("lsp-sample-scene " + file("atrium.glb") + " --quiet --triangles 14056 --scene atrium"), 0);
+  ASSERT_EQ(run("lsp-bake " + file("atrium.glb") + " -o " + file("atrium.lsp") +
+                " --preset fast --cells 4 --quiet"),
+            0);
+  const auto picture = [](const std::string& options, int samples) {
+    EXPECT_EQ(run("lsp-render " + file("atrium.lsp") + " -o " + file("p.pfm") +
+                  " --quiet --size 24x14 --camera=-7.9,1.5,-0.9:3,3.1,0.35:66 --samples " +
+                  std::to_string(samples) + " " + options),
+              0);
+    return read_pfm(file("p.pfm"));
+  };
+  const auto error_of_mean = [](const Comparison& c) { return std::abs(c.mean_test / c.mean_reference - 1); };
+  const std::string tables = " --mode approximate --quality fast";
+  for (const std::string effect : {"--effect all --bounces 2", "--effect ao"}) {
+    SCOPED_TRACE(effect);
+    const Picture exact = picture(effect, 1024);
+    const Comparison wrong = compare(exact, picture(effect + tables, 1024));
+    const Comparison right = compare(exact, picture(effect + tables + " --verify 50", 1024));
+    EXPECT_GT(error_of_mean(wrong), 0.02);
+    EXPECT_LT(error_of_mean(right), 0.003);
+    EXPECT_LT(right.relative_mean, 0.3 * wrong.relative_mean);
+    const Comparison early = compare(picture(effect, 64), picture(effect + tables + " --verify 50", 64));
+    EXPECT_NEAR(early.relative_mean / right.relative_mean, 4.0, 1.0) << "noise falls as one over the root";
+  }
+  // Each kind of path by itself, verified always: the exact picture.
+  for (const std::string effect : {"ao", "diffuse --bounces 3", "glossy --bounces 3"}) {
+    SCOPED_TRACE(effect);
+    const Comparison c = compare(picture("--effect " + effect, 4),
+                                 picture("--effect " + effect + tables + " --verify 100", 4));
+    EXPECT_GT(c.mean_reference, 0.0);
+    EXPECT_LT(c.relative_mean, 1e-6);
+  }
+}
+
+TEST_F(Programs, VerifyIsTheSameWhereverItRuns) {
+  const std::string options = "--mode approximate --bounces 2 --verify 25 --denoise";
+  render("spheres", "one", options + " --threads 1");
+  render("spheres", "three", options + " --threads 3");
+  EXPECT_EQ(read(file("one.pfm")), read(file("three.pfm")));
+  std::string why;
+  if (!VulkanTracer::available(&why)) GTEST_SKIP() << "no Vulkan device: " << why;
+  for (const std::string effect : {"all", "ao"}) {
+    render("spheres", "cpu", options + " --effect " + effect);
+    render("spheres", "vulkan", options + " --backend vulkan --effect " + effect);
+    EXPECT_EQ(read(file("cpu.pfm")), read(file("vulkan.pfm"))) << effect;
+  }
+}
+
+TEST_F(Programs, VerifyIsAShareOfPathsAndSaysWhereItDoesNothing) {
+  const std::string command =
+      "lsp-render " + file("spheres.lsp") + " -o " + file("x.pfm") + " --size 64x36 --samples 16 ";
+  ASSERT_EQ(run(command + "--mode approximate --verify 12.5 --json > " + file("x.json")), 0);
+  const nlohmann::json report = nlohmann::json::parse(read(file("x.json")));
+  const double paths = report.at("paths").get<double>();
+  EXPECT_GT(paths, 1000);
+  EXPECT_NEAR(report.at("verified_paths").get<double>() / paths, 0.125, 0.025);
+  for (const char* value : {"-1", "101", "all"})
+    EXPECT_EQ(run(command + "--mode approximate --verify " + value + " >/dev/null 2>&1"), 1) << value;
+  for (const char* elsewhere : {"--mode exact", "--mode approximate --heat loss"}) {
+    ASSERT_EQ(run(command + "--verify 10 " + elsewhere + " >/dev/null 2> " + file("notes.txt")), 0);
+    EXPECT_NE(read(file("notes.txt")).find("--verify does nothing"), std::string::npos) << elsewhere;
   }
 }
 
