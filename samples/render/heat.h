@@ -23,8 +23,8 @@ struct HeatMap {
 struct HeatOptions {
   Heat heat = Heat::kLoss;
   lsp_trace_options trace{};  // of the rays that are looked at
-  int width = 960;
-  int height = 540;
+  int width = 1280;
+  int height = 720;
   uint32_t samples = 16;
   int threads = 0;  // 0: all
 };

@@ -25,7 +25,7 @@ struct Arguments {
   std::string mode = "exact";
   TraceArguments trace;
   std::string camera;
-  std::string size = "960x540";
+  std::string size = "1280x720";
   std::string backend = "cpu";
   std::string sun;
   float verify_percent = 0.0f;
@@ -196,6 +196,7 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
                                         {"backend", arguments.backend},
                                         {"device", tracer->device()},
                                         {"load_path", tracer->load_path()},
+                                        {"dispatches", tracer->dispatches()},
                                         {"seconds", report.seconds},
                                         {"primary_rays", report.primary_rays},
                                         {"primary_seconds", report.primary_seconds},
@@ -257,7 +258,8 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0.0f, 100.0f));
   app.add_option("--camera", a.camera,
                  "X,Y,Z:X,Y,Z:FOV, the vertical angle in degrees (default: from the scene)");
-  app.add_option("--size", a.size, "In pixels (default 960x540)");
+  app.add_option("--size", a.size,
+                 "In pixels (default 1280x720); traced in pieces, so that no device is kept busy for long");
   app.add_option("--samples", a.options.samples, "Samples a pixel (default 16)")
       ->check(CLI::Range(1u, 1u << 20));
   app.add_option("--bounces", a.options.bounces, "Bounces of indirect light (default 1)")

@@ -51,15 +51,20 @@ class VulkanRayTracer : public RayTracer {
   double trace(const lsp_trace_options& options, std::span<const LspRay> rays,
                std::span<LspHit> hits) override {
     if (rays.empty()) return 0;
-    if (instances_ == nullptr) return tracer_.trace(options, rays, hits).seconds;
-    return tracer_.trace_instances(*instances_, options, 0xFF, rays, hits).seconds;
+    const VulkanTrace traced = instances_ == nullptr
+                                   ? tracer_.trace(options, rays, hits)
+                                   : tracer_.trace_instances(*instances_, options, 0xFF, rays, hits);
+    dispatches_ += traced.batches;
+    return traced.seconds;
   }
+  uint64_t dispatches() const override { return dispatches_; }
   std::string device() const override { return tracer_.device_name(); }
   std::string load_path() const override { return name_of(tracer_.load_path()); }
 
  private:
   const lsp_instances* instances_;  // null: there is one file
   VulkanTracer tracer_;
+  uint64_t dispatches_ = 0;
 };
 
 }  // namespace

@@ -18,6 +18,8 @@ class RayTracer {
   virtual double trace(const lsp_trace_options& options, std::span<const LspRay> rays,
                        std::span<LspHit> hits) = 0;
   virtual std::string device() const = 0;
+  // Pieces of work that a device was given so far, of at most 2^20 rays each; 0 for the CPU.
+  virtual uint64_t dispatches() const { return 0; }
   // How the file came to the device: "mapped", "import" or "upload".
   virtual std::string load_path() const = 0;
 };

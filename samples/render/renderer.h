@@ -1,5 +1,7 @@
 // Renders a picture in waves: all rays of one kind of one sample of many pixels at a time, so that the same
-// code feeds a CPU's threads and a GPU.
+// code feeds a CPU's threads and a GPU. A wave is at most 131,072 pixels, so that however large the picture
+// no work on a device lasts long (systems end what lasts seconds) and memory beside the picture stays the
+// same.
 //
 //   a wave (pixels of one sample):
 //     primary rays, exact --> surfaces --+--> shadow rays to sky, sun, emitters, exact      (direct)
@@ -25,8 +27,8 @@ struct RenderOptions {
   Effect effect = Effect::kAll;
   lsp_trace_options indirect{};  // what indirect rays are traced with
   float verify = 0.0f;           // share of indirect paths that are traced exactly, too, and correct the mean
-  int width = 960;
-  int height = 540;
+  int width = 1280;
+  int height = 720;
   uint32_t samples = 16;
   uint32_t first_sample = 0;  // the sequence's first point: pictures of several runs can be averaged
   int bounces = 1;            // of indirect light

@@ -231,6 +231,29 @@ TEST_F(Programs, VerifyIsAShareOfPathsAndSaysWhereItDoesNothing) {
   }
 }
 
+// However large the picture, a device gets it in pieces of at most 131,072 pixels.
+TEST_F(Programs, DevicesGetThePictureInPieces) {
+  std::string why;
+  if (!VulkanTracer::available(&why)) GTEST_SKIP() << "no Vulkan device: " << why;
+  const auto report = [](const std::string& options) {
+    EXPECT_EQ(
+        run("lsp-render " + file("spheres.lsp") + " -o " + file("x.pfm") +
+            " --camera 0,1,0.1:0,0,0:100 --effect ao --samples 1 --json " + options + " > " + file("x.json")),
+        0);
+    return nlohmann::json::parse(read(file("x.json")));
+  };
+  // 131,584 pixels: two pieces, for primary rays and for those of ambient occlusion, and one ray to try the
+  // device.
+  const uint64_t dispatches = report("--backend vulkan --size 512x257").at("dispatches");
+  EXPECT_GE(dispatches, 3u);
+  EXPECT_LE(dispatches, 5u);
+  EXPECT_LE(report("--backend vulkan --size 64x36").at("dispatches"), 3u);
+  const nlohmann::json usual = report("");
+  EXPECT_EQ(usual.at("width"), 1280);
+  EXPECT_EQ(usual.at("height"), 720);
+  EXPECT_EQ(usual.at("dispatches"), 0u) << "the CPU's";
+}
+
 TEST_F(Programs, HeatIsWhereTablesLoseAndWorkGoes) {
   const auto total = [](const Picture& picture) {
     double sum = 0;
