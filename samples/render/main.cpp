@@ -24,6 +24,7 @@ struct Arguments {
   std::string heat;
   std::string mode = "exact";
   TraceArguments trace;
+  std::string light_quality;
   std::string camera;
   std::string size = "1280x720";
   std::string backend = "cpu";
@@ -63,6 +64,17 @@ Effect parse_effect(const std::string& name) {
   if (name == "diffuse") return Effect::kDiffuse;
   if (name == "glossy") return Effect::kGlossy;
   return Effect::kAll;
+}
+
+// Of rays to lights from where indirect rays land.
+lsp_trace_options light_options(const Arguments& arguments, bool approximate) {
+  if (arguments.light_quality == "exact") return {};
+  TraceArguments trace = arguments.trace;
+  if (!arguments.light_quality.empty()) {
+    trace.quality = arguments.light_quality;
+    trace.max_loss = -1;
+  }
+  return to_trace_options(trace, approximate);
 }
 
 Heat parse_heat(const std::string& name) {
@@ -109,6 +121,7 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
   const bool approximate = arguments.mode == "approximate";
   options.indirect = to_trace_options(arguments.trace, approximate);
   if (approximate) options.verify = arguments.verify_percent / 100.0f;
+  options.light = light_options(arguments, approximate);
   parse_size(arguments.size, options);
   for (const std::string& output : arguments.outputs) {
     const std::filesystem::path ending = std::filesystem::path(output).extension();
@@ -130,6 +143,10 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
       std::cerr << program << ": " << arguments.file << ": " << note << "\n";
     for (const std::string& note : unused_arguments(arguments.trace, approximate, scene.headers()))
       std::cerr << program << ": " << arguments.file << ": " << note << "\n";
+    if (!arguments.light_quality.empty() && (!approximate || options.effect == Effect::kAmbientOcclusion)) {
+      std::cerr << program << ": " << arguments.file << ": --light-quality does nothing: "
+                << (approximate ? "ambient occlusion has no rays to lights" : "rays are exact") << "\n";
+    }
     if (arguments.verify_percent > 0 && (!approximate || !arguments.heat.empty())) {
       std::cerr << program << ": " << arguments.file << ": --verify does nothing: "
                 << (approximate ? "--heat shows rays as they are" : "rays are exact") << "\n";
@@ -187,6 +204,9 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
                                         {"mode", arguments.mode},
                                         {"near", arguments.trace.near},
                                         {"lod", arguments.trace.lod},
+                                        {"light_quality", arguments.light_quality.empty()
+                                                              ? "as the others"
+                                                              : arguments.light_quality},
                                         {"width", options.width},
                                         {"height", options.height},
                                         {"samples", options.samples},
@@ -251,6 +271,11 @@ int main(int argc, char** argv) {
   app.add_option("--mode", a.mode, "How indirect rays are traced (default exact)")
       ->check(CLI::IsMember({"exact", "approximate"}));
   add_trace_arguments(app, a.trace);
+  app.add_option("--light-quality", a.light_quality,
+                 "Approximate, cells: the quality of rays to lights from where indirect rays land, most of "
+                 "all rays, whose errors show least; exact: none of them errs (default: as --quality and "
+                 "--max-loss say)")
+      ->check(CLI::IsMember({"fast", "balanced", "accurate", "exact"}));
   app.add_option(
          "--verify", a.verify_percent,
          "Approximate: share of indirect paths that are traced exactly, too, and correct the others, "
@@ -283,7 +308,8 @@ int main(int argc, char** argv) {
         {"FILE.lsp", "--output FILE", "--effect", "--mode", "--camera EYE:TARGET:ANGLE", "--samples"}},
        {"The picture", {"--size WxH", "--exposure STOPS", "--denoise", "--heat"}},
        {"Light", {"--bounces", "--radius", "--sun X,Y,Z"}},
-       {"Approximate mode", {"--near", "--lod", "--quality", "--max-loss PERCENT", "--verify PERCENT"}},
+       {"Approximate mode",
+        {"--near", "--lod", "--quality", "--max-loss PERCENT", "--light-quality", "--verify PERCENT"}},
        {"The machine", {"--backend", "--threads"}}});
   return run_program(kProgram, app, argc, argv, [&] { run(a, common, kProgram); });
 }

@@ -343,11 +343,11 @@ class Renderer {
     });
     report_.paths += paths_.size();
     choose_verified();
-    follow_paths(options_.indirect);
+    follow_paths(options_.indirect, options_.light);
     paths_.swap(verified_);
     path_rays_.swap(verified_rays_);
     report_.verified_paths += paths_.size();
-    follow_paths({});
+    follow_paths({}, {});
   }
 
   // Copies the paths to verify with their first rays, and weights both.
@@ -365,9 +365,9 @@ class Renderer {
     }
   }
 
-  void follow_paths(const lsp_trace_options& options) {
+  void follow_paths(const lsp_trace_options& options, const lsp_trace_options& light) {
     for (int bounce = 0; bounce < options_.bounces && !paths_.empty(); ++bounce)
-      follow_bounce(options, bounce);
+      follow_bounce(options, light, bounce);
   }
 
   LspRay start_diffuse(const Surface& s, Path& path) const {
@@ -415,7 +415,7 @@ class Renderer {
     return ray_from(s.point, above(s.point, direction), kInfinity);
   }
 
-  void follow_bounce(const lsp_trace_options& options, int bounce) {
+  void follow_bounce(const lsp_trace_options& options, const lsp_trace_options& light, int bounce) {
     path_hits_.resize(path_rays_.size());
     report_.indirect_rays += path_rays_.size();
     report_.indirect_seconds += tracer_.trace(options, path_rays_, path_hits_);
@@ -456,7 +456,7 @@ class Renderer {
                       component, path.weight);
     });
     end_light();
-    trace_light(options, true);
+    trace_light(light, true);
 
     if (bounce + 1 == options_.bounces) return;
     path_rays_.resize(kept);

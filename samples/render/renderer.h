@@ -5,7 +5,7 @@
 //
 //   a wave (pixels of one sample):
 //     primary rays, exact --> surfaces --+--> shadow rays to sky, sun, emitters, exact      (direct)
-//                                        +--> one diffuse ray, by mode --+--> shadow rays   (diffuse)
+//                                        +--> one diffuse ray, by mode --+--> light rays    (diffuse)
 //                                        +--> one glossy ray, by mode  --+    by mode       (glossy)
 //                                        +--> one short any-hit ray, by mode                (ao)
 //
@@ -26,6 +26,7 @@ enum class Effect { kDirect, kAmbientOcclusion, kDiffuse, kGlossy, kAll };
 struct RenderOptions {
   Effect effect = Effect::kAll;
   lsp_trace_options indirect{};  // what indirect rays are traced with
+  lsp_trace_options light{};     // those to lights from where indirect rays land
   float verify = 0.0f;           // share of indirect paths that are traced exactly, too, and correct the mean
   int width = 1280;
   int height = 720;

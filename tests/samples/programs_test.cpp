@@ -46,6 +46,15 @@ class Programs : public ::testing::Test {
 
   static std::string file(const std::string& name) { return (folder_ / name).string(); }
 
+  // atrium.lsp, in few cells.
+  static void bake_hall() {
+    if (std::filesystem::exists(file("atrium.lsp"))) return;
+    ASSERT_EQ(run("lsp-sample-scene " + file("atrium.glb") + " --quiet --triangles 14056 --scene atrium"), 0);
+    ASSERT_EQ(run("lsp-bake " + file("atrium.glb") + " -o " + file("atrium.lsp") +
+                  " --preset fast --cells 4 --quiet"),
+              0);
+  }
+
   // Renders `scene` into NAME.pfm and reads it back.
   static Picture render(const std::string& scene, const std::string& name, const std::string& options,
                         int samples = 4) {
@@ -167,10 +176,7 @@ TEST_F(Programs, VulkanGivesTheSamePicture) {
 // A hall in tables so coarse that the picture by tables alone is far off: with a share of its paths verified
 // its mean comes to the exact one's, and the rest is noise that goes as samples come.
 TEST_F(Programs, VerifiedPathsMakeTheMeanExact) {
-  ASSERT_EQ(run("lsp-sample-scene " + file("atrium.glb") + " --quiet --triangles 14056 --scene atrium"), 0);
-  ASSERT_EQ(run("lsp-bake " + file("atrium.glb") + " -o " + file("atrium.lsp") +
-                " --preset fast --cells 4 --quiet"),
-            0);
+  bake_hall();
   const auto picture = [](const std::string& options, int samples) {
     EXPECT_EQ(run("lsp-render " + file("atrium.lsp") + " -o " + file("p.pfm") +
                   " --quiet --size 24x14 --camera=-7.9,1.5,-0.9:3,3.1,0.35:66 --samples " +
@@ -228,6 +234,36 @@ TEST_F(Programs, VerifyIsAShareOfPathsAndSaysWhereItDoesNothing) {
   for (const char* elsewhere : {"--mode exact", "--mode approximate --heat loss"}) {
     ASSERT_EQ(run(command + "--verify 10 " + elsewhere + " >/dev/null 2> " + file("notes.txt")), 0);
     EXPECT_NE(read(file("notes.txt")).find("--verify does nothing"), std::string::npos) << elsewhere;
+  }
+}
+
+// Of the picture's rays those to lights from where others land have a quality of their own.
+TEST_F(Programs, RaysToLightsHaveAQualityOfTheirOwn) {
+  bake_hall();
+  const auto picture = [](const std::string& options) {
+    return render("atrium", "light", "--camera=-7.9,1.5,-0.9:3,3.1,0.35:66 --effect diffuse " + options, 16);
+  };
+  const Picture exact = picture("");
+  const auto off = [&](const std::string& options) {
+    return compare(exact, picture("--mode approximate " + options)).relative_mean;
+  };
+  const double fast = off("--quality fast"), balanced = off("--quality balanced");
+  EXPECT_EQ(off("--quality balanced --light-quality balanced"), balanced);
+  EXPECT_EQ(off("--max-loss 100"), fast);
+  EXPECT_EQ(off("--max-loss 0 --light-quality fast"),
+            off("--max-loss 0 --quality fast --light-quality fast"));
+  const double mixed = off("--quality balanced --light-quality fast");
+  EXPECT_GT(mixed, balanced);
+  EXPECT_LT(mixed, fast);
+  EXPECT_LT(off("--quality balanced --light-quality exact"), balanced);
+  EXPECT_EQ(run("lsp-render " + file("atrium.lsp") + " -o " + file("x.pfm") +
+                " --mode approximate --light-quality best >/dev/null 2>&1"),
+            1);
+  for (const char* elsewhere : {"--mode exact", "--mode approximate --effect ao"}) {
+    ASSERT_EQ(run("lsp-render " + file("atrium.lsp") + " -o " + file("x.pfm") +
+                  " --size 8x8 --light-quality fast " + elsewhere + " >/dev/null 2> " + file("notes.txt")),
+              0);
+    EXPECT_NE(read(file("notes.txt")).find("--light-quality does nothing"), std::string::npos) << elsewhere;
   }
 }
 
