@@ -62,7 +62,6 @@ struct PictureGrid {
   std::string caption;
   size_t columns = 1;
   std::vector<Picture> pictures;
-  std::string legend;  // what the right end of the heat maps' scale means; empty: there are no heat maps
 };
 
 struct Section {

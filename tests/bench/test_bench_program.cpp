@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <map>
 
 #include "process.h"
 #include "report.h"
@@ -13,6 +14,13 @@ namespace lsp::bench {
 namespace {
 
 namespace fs = std::filesystem;
+
+// The rows of a table by their mode.
+std::map<std::string, Json> by_mode(const Json& table) {
+  std::map<std::string, Json> rows;
+  for (const Json& row : table) rows[row["mode"].get<std::string>()] = row;
+  return rows;
+}
 
 class BenchProgram : public testing::Test {
  protected:
@@ -105,10 +113,50 @@ TEST_F(BenchProgram, MeasuresAFileAsItIs) {
   const ProcessResult run = bench({baked.string(), "-o", out.string(), "--quick", "--quiet", "--no-vulkan",
                                    "--suite", "peers", "--suite", "pictures"});
   EXPECT_EQ(run.exit_code, 0) << run.errors;
-  EXPECT_TRUE(fs::exists(out / "room-ao-bvh-heat.jpg"));
-  EXPECT_FALSE(fs::exists(directory_ / "room-polished.lsp"));
+  EXPECT_TRUE(fs::exists(out / "room-wide-ao-short-line-spaces-difference.jpg"));
   EXPECT_EQ(run.output, "");
   EXPECT_TRUE(fs::exists(out / "report.html"));
+}
+
+TEST_F(BenchProgram, PicturesAreOfCells) {
+  const fs::path input = directory_ / "room.ply", out = directory_ / "out";
+  write_ply(input, room_of_spheres(3000));
+  const ProcessResult run =
+      bench({input.string(), "-o", out.string(), "--quick", "--json", "--no-vulkan", "--suite", "pictures"});
+  ASSERT_EQ(run.exit_code, 0) << run.errors;
+  const Json tables = Json::parse(run.output)["sections"]["pictures"]["tables"];
+  const auto same = by_mode(tables["pictures"]);
+  ASSERT_EQ(same.size(), 5u) << "four points of the dial and Line Spaces";
+  for (const auto& [mode, row] : same) {
+    EXPECT_EQ(row["scene"], "room");
+    EXPECT_EQ(row["light"], "ao-short");
+    for (const char* key : {"seconds", "exact_seconds", "times"}) EXPECT_GT(row[key].get<double>(), 0) << key;
+    for (const char* key : {"p99_percent", "blurred_p99_percent", "bias_percent", "ssim"})
+      EXPECT_TRUE(row.contains(key));
+    EXPECT_LE(row["blurred_percent"].get<double>(), row["mean_percent"].get<double>() * 1.001) << mode;
+    EXPECT_LE(row["structure"].get<double>(), 1.001) << mode;
+    EXPECT_GE(row["flip"].get<double>(), 0) << mode;
+  }
+  const auto error = [&](const char* mode) { return same.at(mode)["mean_percent"].get<double>(); };
+  EXPECT_GT(error("fast"), 0);
+  EXPECT_LE(error("balanced"), error("fast"));
+  EXPECT_LE(error("accurate"), error("balanced"));
+  EXPECT_LE(error("max-loss 0"), error("accurate"));
+
+  const auto equal = by_mode(tables["pictures_equal_time"]);
+  ASSERT_EQ(equal.size(), 3u);
+  for (const auto& [mode, row] : equal) {
+    EXPECT_GE(row["exact_samples"].get<int>(), 1) << mode;
+    EXPECT_GT(row["exact_mean_percent"].get<double>(), 0) << mode;
+    // Fewer samples are noise: less of it is left by a blur than of the error of tables.
+    EXPECT_LT(row["exact_structure"].get<double>(), 0.6) << mode;
+  }
+  for (const char* name : {"exact", "fast", "balanced", "accurate"}) {
+    const std::string id = std::string("room-wide-ao-short-") + name;
+    EXPECT_TRUE(fs::exists(out / (id + ".jpg"))) << id;
+    EXPECT_TRUE(fs::exists(out / (id + "-difference.jpg"))) << id;
+    EXPECT_TRUE(fs::exists(out / (id + "-detail.png"))) << id;
+  }
 }
 
 }  // namespace
