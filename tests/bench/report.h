@@ -39,6 +39,7 @@ struct Series {
   std::string name;
   std::vector<Point> points;
   bool line = false;  // join the points in order
+  int kin = -1;       // the series whose colour this one has, by number; its line is dashed then. -1: its own
 };
 
 struct Plot {

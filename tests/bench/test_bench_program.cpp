@@ -22,6 +22,42 @@ std::map<std::string, Json> by_mode(const Json& table) {
   return rows;
 }
 
+// The rows of a table where row[key] is `value`.
+Json rows_where(const Json& table, const char* key, const std::string& value) {
+  Json rows = Json::array();
+  for (const Json& row : table) {
+    if (row[key] == value) rows.push_back(row);
+  }
+  return rows;
+}
+
+// The dial's points for a set of rays, and that they are ordered as a dial is.
+void expect_a_dial(const Json& table, const std::string& rays) {
+  const auto points = by_mode(rows_where(table, "rays", rays));
+  ASSERT_EQ(points.size(), 12u) << rays;
+  const auto figure = [&](const std::string& mode, const char* key) {
+    return points.at(mode)[key].get<double>();
+  };
+  for (const auto& [mode, row] : points) {
+    for (const char* key : {"times", "times_embree", "mrays", "file_mb"}) {
+      EXPECT_GT(row[key].get<double>(), 0) << mode << " " << key;
+    }
+  }
+  EXPECT_LT(figure("exact", "wrong_percent"), 0.01);
+  EXPECT_EQ(figure("exact", "lookups"), 0);
+  EXPECT_EQ(figure("max-loss 100", "exact_calls"), 0) << "tables alone";
+  const char* const dial[] = {"max-loss 100", "max-loss 50", "max-loss 20", "max-loss 10",
+                              "max-loss 5",   "max-loss 2",  "max-loss 1",  "max-loss 0"};
+  for (size_t k = 1; k < std::size(dial); ++k) {
+    EXPECT_GE(figure(dial[k], "exact_calls"), figure(dial[k - 1], "exact_calls")) << dial[k];
+    EXPECT_LE(figure(dial[k], "wrong_percent"), figure(dial[k - 1], "wrong_percent") + 0.1) << dial[k];
+  }
+  EXPECT_GT(figure("max-loss 100", "wrong_percent"), figure("max-loss 0", "wrong_percent"));
+  EXPECT_LT(figure("max-loss 0", "wrong_percent"), 0.1);
+  EXPECT_LE(figure("accurate", "wrong_percent"), figure("fast", "wrong_percent"));
+  EXPECT_GE(figure("accurate", "exact_calls"), figure("fast", "exact_calls"));
+}
+
 class BenchProgram : public testing::Test {
  protected:
   void SetUp() override {
@@ -71,7 +107,11 @@ TEST_F(BenchProgram, WritesAReport) {
     EXPECT_TRUE(row["mode"] != "exact" || row["wrong_percent"].get<double>() < 0.01);
     EXPECT_GT(row["nodes"].get<double>() + row["shafts"].get<double>(), 1);
   }
-  for (const char* name : {"report.html", "report.json", "pareto.csv", "peers.csv", "pareto_frontier.svg"}) {
+  const Json& dial = json["sections"]["pareto"]["tables"]["pareto_dial"];
+  expect_a_dial(dial, "diffuse, shuffled");
+  expect_a_dial(dial, "surface");
+  for (const char* name : {"report.html", "report.json", "pareto.csv", "peers.csv", "pareto_frontier.svg",
+                           "pareto_dial.csv", "pareto_dial_surface.svg"}) {
     EXPECT_TRUE(fs::exists(out / name)) << name;
   }
 }
@@ -98,9 +138,9 @@ TEST_F(BenchProgram, OneSceneThatFailsDoesNotEndTheRun) {
   EXPECT_EQ(json["warnings"].dump().find("earlier run"), std::string::npos);
   EXPECT_GT(json["sections"]["cost"]["tables"]["costs"].size(), 1u);
   // Once more: the bakes are there, and the report says so. Another input of that name is baked anew.
-  EXPECT_NE(bench(command).output.find("Of 2 bakes 2 are from an earlier run"), std::string::npos);
+  EXPECT_NE(bench(command).output.find("Of 4 bakes 4 are from an earlier run"), std::string::npos);
   write_ply(good, room_of_spheres(1500));
-  EXPECT_NE(bench(command).output.find("Of 2 bakes 1 are from an earlier run"), std::string::npos);
+  EXPECT_NE(bench(command).output.find("Of 4 bakes 2 are from an earlier run"), std::string::npos);
 }
 
 TEST_F(BenchProgram, MeasuresAFileAsItIs) {
@@ -116,6 +156,23 @@ TEST_F(BenchProgram, MeasuresAFileAsItIs) {
   EXPECT_TRUE(fs::exists(out / "room-wide-ao-short-line-spaces-difference.jpg"));
   EXPECT_EQ(run.output, "");
   EXPECT_TRUE(fs::exists(out / "report.html"));
+}
+
+TEST_F(BenchProgram, MeasuresTheDialOfAFileOfCells) {
+  const fs::path input = directory_ / "room.ply", baked = directory_ / "room.lsp", out = directory_ / "out";
+  write_ply(input, room_of_spheres(2000));
+  ASSERT_EQ(run_process({program_path("lsp-bake").string(), input.string(), "-o", baked.string(), "--quiet",
+                         "--preset", "fast", "--cells", "6"})
+                .exit_code,
+            0);
+  const ProcessResult run = bench({baked.string(), "-o", out.string(), "--quick", "--json", "--no-vulkan",
+                                   "--suite", "pareto", "--suite", "peers", "--suite", "pictures"});
+  ASSERT_EQ(run.exit_code, 0) << run.errors;
+  const Json json = Json::parse(run.output);
+  expect_a_dial(json["sections"]["pareto"]["tables"]["pareto_dial"], "diffuse, shuffled");
+  EXPECT_EQ(json["sections"]["pareto"]["tables"]["pareto"].size(), 0u) << "there are no Line Spaces";
+  EXPECT_EQ(by_mode(json["sections"]["pictures"]["tables"]["pictures"]).size(), 4u);
+  EXPECT_NE(json["answers"].dump().find("point of the dial of cells"), std::string::npos);
 }
 
 TEST_F(BenchProgram, PicturesAreOfCells) {

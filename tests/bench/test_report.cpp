@@ -157,6 +157,40 @@ TEST(Answers, TakeTheFastestWithinALimit) {
   EXPECT_TRUE(sentences({}).empty());
 }
 
+TEST(Answers, SayWhatTheDialOfCellsDoes) {
+  Answers answers;
+  answers.cells = {{"hall", "cells", "max-loss 100", 4.0, 3.0, 0.8, 0.9, 20},
+                   {"hall", "cells", "max-loss 1", 1.5, 0.9, 0.05, 0.1, 20}};
+  std::string text;
+  for (const std::string& sentence : sentences(answers)) text += sentence + "\n";
+  EXPECT_NE(
+      text.find("At 1 % wrong answers, shuffled diffuse rays, the fastest point of the dial of cells is "
+                "4.00x the exact trace of the same file (wide nodes) on the CPU and 3.00x on Vulkan."),
+      std::string::npos)
+      << text;
+  EXPECT_NE(
+      text.find("At 0.1 % wrong answers, shuffled diffuse rays, the fastest point of the dial of cells is "
+                "1.50x the exact trace of the same file (wide nodes) on the CPU and 1.00x on Vulkan."),
+      std::string::npos)
+      << text;
+}
+
+TEST(Plot, KinHaveOneColourAndTheYoungerIsDashed) {
+  Plot plot = sample().sections[0].plots[0];
+  plot.series = {{"one", {{1, 1, ""}, {2, 2, ""}}, true},
+                 {"two", {{1, 2, ""}, {2, 3, ""}}, true},
+                 {"one's kin", {{1, 3, ""}, {2, 4, ""}}, true, 0}};
+  const std::string svg = to_svg(plot);
+  const auto strokes = [&](const std::string& text) {
+    size_t count = 0;
+    for (size_t at = svg.find(text); at != std::string::npos; at = svg.find(text, at + 1)) ++count;
+    return count;
+  };
+  EXPECT_EQ(strokes("stroke='#0072B2'"), 2u);
+  EXPECT_EQ(strokes("stroke='#D55E00'"), 1u);
+  EXPECT_EQ(strokes("stroke-dasharray"), 1u);
+}
+
 TEST(Timing, MedianAndSpread) {
   const Timing timing = timing_of({5, 1, 2, 3, 4});
   EXPECT_DOUBLE_EQ(timing.median, 3);
