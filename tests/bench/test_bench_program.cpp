@@ -110,8 +110,17 @@ TEST_F(BenchProgram, WritesAReport) {
   const Json& dial = json["sections"]["pareto"]["tables"]["pareto_dial"];
   expect_a_dial(dial, "diffuse, shuffled");
   expect_a_dial(dial, "surface");
+  const Json& fields = json["sections"]["peers"]["tables"]["peers_field"];
+  ASSERT_EQ(fields.size(), 4u) << "two sets of rays, a field and cells: " << run.output;
+  for (const Json& row : fields) {
+    for (const char* key : {"megabytes", "bake_seconds", "mrays", "steps", "depth_mean_percent"})
+      EXPECT_GT(row[key].get<double>(), 0) << row.dump();
+    EXPECT_LT(row["wrong_percent"].get<double>(), 10) << row.dump();
+    const bool is_field = row["peer"].get<std::string>().find("distance field") == 0;
+    EXPECT_EQ(row.contains("threshold"), is_field);
+  }
   for (const char* name : {"report.html", "report.json", "pareto.csv", "peers.csv", "pareto_frontier.svg",
-                           "pareto_dial.csv", "pareto_dial_surface.svg"}) {
+                           "pareto_dial.csv", "pareto_dial_surface.svg", "peers_field.csv"}) {
     EXPECT_TRUE(fs::exists(out / name)) << name;
   }
 }
@@ -172,6 +181,8 @@ TEST_F(BenchProgram, MeasuresTheDialOfAFileOfCells) {
   expect_a_dial(json["sections"]["pareto"]["tables"]["pareto_dial"], "diffuse, shuffled");
   EXPECT_EQ(json["sections"]["pareto"]["tables"]["pareto"].size(), 0u) << "there are no Line Spaces";
   EXPECT_EQ(by_mode(json["sections"]["pictures"]["tables"]["pictures"]).size(), 4u);
+  const Json fields = json["sections"]["peers"]["tables"]["peers_field"];
+  EXPECT_EQ(fields.size(), 2u) << "of each set of rays the field alone";
   EXPECT_NE(json["answers"].dump().find("point of the dial of cells"), std::string::npos);
 }
 
