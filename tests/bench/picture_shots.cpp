@@ -60,11 +60,15 @@ Rendered render(const Context& context, const std::filesystem::path& file, const
 
 float exposure_for(const std::string& effect, const Image& image) {
   if (effect == "ao") return 1;
-  std::vector<float> values;
-  for (const glm::vec3& pixel : image.pixels) values.push_back(std::max({pixel.r, pixel.g, pixel.b}));
+  std::vector<float> values;  // of what light comes to
+  for (const glm::vec3& pixel : image.pixels) {
+    const float value = std::max({pixel.r, pixel.g, pixel.b});
+    if (value > 0) values.push_back(value);
+  }
+  if (values.empty()) return 0;
   const auto at = values.begin() + static_cast<ptrdiff_t>(values.size() * 95 / 100);
   std::nth_element(values.begin(), at, values.end());
-  return *at > 0 ? 0.9f / *at : 0;
+  return 0.9f / *at;
 }
 
 Polished::Polished(const std::filesystem::path& file, const std::filesystem::path& folder) : file_(file) {
