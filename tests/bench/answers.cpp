@@ -39,9 +39,27 @@ std::string joined(const std::vector<std::string>& words) {
   return text;
 }
 
-bool measured_on_vulkan(const Answers& answers) {
-  return !answers.samples.empty() && std::all_of(answers.samples.begin(), answers.samples.end(),
-                                                 [](const Sample& s) { return s.times_vulkan > 0; });
+bool measured_on_vulkan(const std::vector<Sample>& samples) {
+  return !samples.empty() &&
+         std::all_of(samples.begin(), samples.end(), [](const Sample& s) { return s.times_vulkan > 0; });
+}
+
+// One sentence a limit: the fastest of `samples`, which is called `what`, against `yardstick`.
+void add_limits(std::vector<std::string>& out, const std::vector<Sample>& samples, const std::string& what,
+                const std::string& yardstick) {
+  for (const double limit : kLimits) {
+    std::string text =
+        number("At %g %% wrong answers", limit) + ", shuffled diffuse rays, the fastest " + what + " " +
+        range_of(best_within(samples, limit, &Sample::times), [](const Sample& s) { return s.times; }) + " " +
+        yardstick + " on the CPU";
+    if (measured_on_vulkan(samples)) {
+      text += " and " +
+              range_of(best_within(samples, limit, &Sample::times_vulkan),
+                       [](const Sample& s) { return s.times_vulkan; }) +
+              " on Vulkan";
+    }
+    out.push_back(text + ".");
+  }
 }
 
 // The fastest approximate trace against another exact tracer on the CPU.
@@ -109,23 +127,12 @@ Best best_within(const std::vector<Sample>& samples, double limit, double Sample
 
 std::vector<std::string> sentences(const Answers& answers) {
   std::vector<std::string> out;
+  if (!answers.cells.empty())
+    add_limits(out, answers.cells, "point of the dial of cells is",
+               "the exact trace of the same file (wide nodes)");
   if (!answers.samples.empty()) {
-    const bool vulkan = measured_on_vulkan(answers);
-    for (const double limit : kLimits) {
-      std::string text = number("At %g %% wrong answers", limit) +
-                         ", shuffled diffuse rays, the fastest approximate "
-                         "trace is " +
-                         range_of(best_within(answers.samples, limit, &Sample::times),
-                                  [](const Sample& s) { return s.times; }) +
-                         " the exact one on the CPU";
-      if (vulkan) {
-        text += " and " +
-                range_of(best_within(answers.samples, limit, &Sample::times_vulkan),
-                         [](const Sample& s) { return s.times_vulkan; }) +
-                " on Vulkan";
-      }
-      out.push_back(text + ".");
-    }
+    const bool vulkan = measured_on_vulkan(answers.samples);
+    add_limits(out, answers.samples, "approximate trace is", "the exact one");
     add_peer(out, answers, "Embree (rtcIntersect1, robust, the same rays and threads), which",
              &ScenePeers::embree);
     add_peer(out, answers, "an exact tree of our own with eight children a node and SIMD, which",
@@ -162,7 +169,7 @@ Section answers_section(const Answers& answers) {
   for (const double limit : kLimits) {
     for (double Sample::*times : {&Sample::times, &Sample::times_vulkan}) {
       const bool cpu = times == &Sample::times;
-      if (!cpu && !measured_on_vulkan(answers)) continue;
+      if (!cpu && !measured_on_vulkan(answers.samples)) continue;
       for (const auto& [scene, sample] : best_within(answers.samples, limit, times)) {
         Json row;
         row["limit"] = limit;

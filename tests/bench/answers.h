@@ -24,12 +24,15 @@ struct ScenePeers {
   double embree = 0;           // rtcIntersect1, robust
   double wide = 0;             // our tree, eight children a node
   double exact_megabytes = 0;  // the file without Line Spaces
+  double wide_vulkan = 0;      // wide nodes of a file of cells, on the device
 };
 
 struct Answers {
   unsigned threads = 1;
   std::string device;  // of Vulkan
   std::vector<Sample> samples;
+  // Points of the dial of cells: times the exact trace of the same file, on the CPU and on the device.
+  std::vector<Sample> cells;
   std::map<std::string, ScenePeers> peers;  // by scene
   std::vector<std::string> others;          // sentences that suites have written themselves
 };

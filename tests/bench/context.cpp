@@ -23,7 +23,33 @@ class VulkanFile : public Tracer {
   VulkanTracer& vulkan_;
 };
 
+const Baked& or_throw(const Baked& baked, const SceneUnderTest& scene) {
+  if (!baked.available) throw Failure(baked.exit, scene.name(), baked.reason);
+  return baked;
+}
+
+// Coarse and quick to bake, with tables whether they pay or not.
+const Bake kQuickCells{"cells8-fast", {"--cells", "8", "--preset", "fast"}};
+// What nothing is asked of.
+const Bake kDefault{"default", {}};
+const Bake kCells{"cells", {"--base", "cells"}};
+
 }  // namespace
+
+const Baked& Context::cells(SceneUnderTest& scene) const {
+  if (scene.is_file()) return scene.base();
+  if (quick) return or_throw(scene.bake(kQuickCells), scene);
+  const Baked& baked = or_throw(scene.bake(kDefault), scene);
+  return OpenFile(baked.path).has_cells() ? baked : or_throw(scene.bake(kCells), scene);
+}
+
+void Context::say_what_cells_are(SceneUnderTest& scene, Section& section) const {
+  if (quick || scene.is_file() || OpenFile(or_throw(scene.bake(kDefault), scene).path).has_cells()) return;
+  section.paragraphs.push_back(scene.name() +
+                               ": the default bake has no tables, since its model of costs says that a ray "
+                               "through them gains nothing; "
+                               "measured is what --base cells makes all the same.");
+}
 
 void Context::guarded(Section& section, const std::string& what, const std::function<void()>& work) {
   std::string message;

@@ -21,7 +21,7 @@ namespace lsp::bench {
 
 struct Context {
   bool large = false;           // also what takes gigabytes a scene
-  bool quick = false;           // smaller everything: under two minutes in all
+  bool quick = false;           // smaller everything: a few minutes in all
   std::filesystem::path cache;  // bakes and pictures go here
   std::vector<std::unique_ptr<SceneUnderTest>> scenes;
   unsigned threads = 1;                  // "all threads"
@@ -34,6 +34,12 @@ struct Context {
   size_t accuracy_rays() const { return quick ? 30000 : 200000; }
   size_t timing_rays() const { return quick ? 1u << 15 : 1u << 17; }
   Bake base_bake() const { return line_space_bake(quick ? 4 : 6, 9); }  // the only BVH of a quick run
+  // The scene's tables as users get them: what lsp-bake makes without being asked for a base structure, or
+  // the file that was given, whatever it has. Where the default leaves tables out, with --base cells; of a
+  // quick run 8 cells along the longest side. Throws Failure where there is none.
+  const Baked& cells(SceneUnderTest& scene) const;
+  // Says in `section` where the default has left tables out.
+  void say_what_cells_are(SceneUnderTest& scene, Section& section) const;
   // Fewer once half of the half hour is over: a slow machine's report shall end in time too.
   int repeats() const { return quick || seconds_since_start() > 900 ? 3 : 5; }
 

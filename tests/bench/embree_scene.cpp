@@ -148,6 +148,35 @@ void drop_passed(const RTCFilterFunctionNArguments* args) {
   }
 }
 
+// The point of the triangle a, b, c that is nearest to p, by the region of the triangle that p lies over
+// (Ericson, Real-Time Collision Detection, 5.1.5).
+glm::vec3 nearest_on(const glm::vec3& p, const glm::vec3& a, const glm::vec3& b, const glm::vec3& c) {
+  const glm::vec3 ab = b - a, ac = c - a, ap = p - a;
+  const float d1 = glm::dot(ab, ap), d2 = glm::dot(ac, ap);
+  if (d1 <= 0 && d2 <= 0) return a;
+  const glm::vec3 bp = p - b;
+  const float d3 = glm::dot(ab, bp), d4 = glm::dot(ac, bp);
+  if (d3 >= 0 && d4 <= d3) return b;
+  const glm::vec3 cp = p - c;
+  const float d5 = glm::dot(ab, cp), d6 = glm::dot(ac, cp);
+  if (d6 >= 0 && d5 <= d6) return c;
+  const float vc = d1 * d4 - d3 * d2, vb = d5 * d2 - d1 * d6, va = d3 * d6 - d5 * d4;
+  if (vc <= 0 && d1 >= 0 && d3 <= 0) return a + d1 / (d1 - d3) * ab;
+  if (vb <= 0 && d2 >= 0 && d6 <= 0) return a + d2 / (d2 - d6) * ac;
+  if (va <= 0 && d4 >= d3 && d5 >= d6) return b + (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (c - b);
+  const float sum = va + vb + vc;
+  return a + vb / sum * ab + vc / sum * ac;
+}
+
+bool come_nearer(RTCPointQueryFunctionArguments* args) {
+  const auto* corners = static_cast<const glm::vec3*>(args->userPtr) + size_t{3} * args->primID;
+  const glm::vec3 point(args->query->x, args->query->y, args->query->z);
+  const float distance = glm::distance(point, nearest_on(point, corners[0], corners[1], corners[2]));
+  if (!(distance < args->query->radius)) return false;
+  args->query->radius = distance;
+  return true;
+}
+
 }  // namespace
 
 const char* EmbreeScene::version() { return RTC_VERSION_STRING; }
@@ -173,6 +202,7 @@ EmbreeScene::EmbreeScene(const Soup& soup, EmbreeMode mode, unsigned threads)
       for (size_t k = 0; k < 3; ++k) vertices[3 * i + k] = soup.corners[i][k];
     }
     for (uint32_t i = 0; i < 3 * soup.size(); ++i) indices[i] = i;
+    corners_ = vertices;
   }
   if (!soup.gaps.empty()) {
     gaps_ = std::make_unique<Soup>(soup);
@@ -189,6 +219,15 @@ EmbreeScene::EmbreeScene(const Soup& soup, EmbreeMode mode, unsigned threads)
   if (rtcGetDeviceError(device_.get()) != RTC_ERROR_NONE) fail(device_.get());
   bytes_ = static_cast<uint64_t>(*allocated_);
   primitives_ = soup.primitives;
+}
+
+float EmbreeScene::distance(const glm::vec3& point, float at_most) const {
+  const FlushDenormals flush;
+  RTCPointQueryContext context;
+  rtcInitPointQueryContext(&context);
+  RTCPointQuery query{point.x, point.y, point.z, 0, at_most};
+  rtcPointQuery(scene_.get(), &query, &context, come_nearer, const_cast<glm::vec3*>(corners_));
+  return query.radius;
 }
 
 void EmbreeScene::closest(std::span<const LspRay> rays, std::span<LspHit> hits, EmbreeCall call) const {

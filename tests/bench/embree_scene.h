@@ -30,6 +30,10 @@ class EmbreeScene {
   // Whether rays[i] hits anything: hits[i].primitive is 0 or LSP_NONE, t is 0 or infinity.
   void any(std::span<const LspRay> rays, std::span<LspHit> hits, EmbreeCall call = EmbreeCall::kSingle) const;
 
+  // The distance from `point` to the nearest triangle, or `at_most` where none is nearer. Where triangles are
+  // there in part they count as whole.
+  float distance(const glm::vec3& point, float at_most) const;
+
   double build_seconds() const { return build_seconds_; }
   uint64_t bytes() const { return bytes_; }  // what Embree allocated, the copied triangles included
   static const char* version();              // "3.13.5"
@@ -44,8 +48,9 @@ class EmbreeScene {
   std::unique_ptr<int64_t> allocated_;  // outlives the device, whose monitor adds to it
   std::unique_ptr<std::remove_pointer_t<RTCDevice>, ReleaseDevice> device_;
   std::unique_ptr<std::remove_pointer_t<RTCScene>, ReleaseScene> scene_;
-  std::unique_ptr<Soup> gaps_;        // none: all is solid
-  std::vector<uint32_t> primitives_;  // Embree's number to import number
+  std::unique_ptr<Soup> gaps_;          // none: all is solid
+  const glm::vec3* corners_ = nullptr;  // three a triangle, Embree's own copy
+  std::vector<uint32_t> primitives_;    // Embree's number to import number
   double build_seconds_ = 0;
   uint64_t bytes_ = 0;
 };

@@ -100,19 +100,6 @@ void draw_frame(Image& image, uint32_t x, uint32_t y, uint32_t width, uint32_t h
   }
 }
 
-glm::vec3 heat_colour(float x) {
-  // Five stops of the "inferno" map of matplotlib.
-  constexpr size_t kStops = 5;
-  static const glm::vec3 stops[kStops] = {{0.0f, 0.0f, 0.02f},
-                                          {0.34f, 0.06f, 0.43f},
-                                          {0.74f, 0.22f, 0.33f},
-                                          {0.98f, 0.56f, 0.04f},
-                                          {0.99f, 1.0f, 0.64f}};
-  const float at = std::clamp(x, 0.0f, 1.0f) * (kStops - 1);
-  const auto below = std::min(static_cast<size_t>(at), kStops - 2);
-  return glm::mix(stops[below], stops[below + 1], at - static_cast<float>(below));
-}
-
 Image to_display(const Image& linear, float exposure) {
   Image image = linear;
   for (glm::vec3& pixel : image.pixels) {
@@ -122,30 +109,6 @@ Image to_display(const Image& linear, float exposure) {
     }
   }
   return image;
-}
-
-double rmse(const Image& reference, const Image& image) {
-  require_same_size(reference, image);
-  double sum = 0;
-  for (size_t i = 0; i < image.pixels.size(); ++i) {
-    const glm::dvec3 off = glm::dvec3(image.pixels[i]) - glm::dvec3(reference.pixels[i]);
-    sum += glm::dot(off, off);
-  }
-  return std::sqrt(sum / (3 * static_cast<double>(image.pixels.size())));
-}
-
-double bias(const Image& reference, const Image& image) {
-  require_same_size(reference, image);
-  glm::dvec3 sum(0);
-  for (size_t i = 0; i < image.pixels.size(); ++i) {
-    sum += glm::dvec3(image.pixels[i]) - glm::dvec3(reference.pixels[i]);
-  }
-  return (sum.x + sum.y + sum.z) / (3 * static_cast<double>(image.pixels.size()));
-}
-
-double psnr(const Image& reference, const Image& image, double peak) {
-  const double error = rmse(reference, image);
-  return error > 0 ? 20 * std::log10(peak / error) : INFINITY;
 }
 
 double ssim(const Image& reference, const Image& image) {

@@ -33,17 +33,10 @@ Image crop(const Image& image, uint32_t x, uint32_t y, uint32_t width, uint32_t 
 // A frame two pixels wide around that part, drawn into `image`.
 void draw_frame(Image& image, uint32_t x, uint32_t y, uint32_t width, uint32_t height, glm::vec3 colour);
 
-// A heat map's colour for x in [0, 1], in display values: black, violet, red, orange, yellow.
-glm::vec3 heat_colour(float x);
-
 // Linear to sRGB, clamped to [0, 1].
 Image to_display(const Image& linear, float exposure = 1);
 
 // All comparisons want two images of one size; throw Failure(kInvalid) otherwise.
-
-double rmse(const Image& reference, const Image& image);  // over all channels
-double bias(const Image& reference, const Image& image);  // mean of image - reference, over all channels
-double psnr(const Image& reference, const Image& image, double peak = 1);  // dB; infinity when equal
 
 // Mean structural similarity of the luma (Rec. 709 weights) of display values: Wang, Bovik, Sheikh,
 // Simoncelli, "Image Quality Assessment", 2004; Gaussian window of 11, sigma 1.5, where it fits. 1: equal.

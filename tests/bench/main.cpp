@@ -215,10 +215,11 @@ int main(int argc, char** argv) {
                  "Folder for the report; bakes go to its subfolder bakes, where a later run finds them")
       ->required();
   app.add_option("--suite", arguments.suites,
-                 "paper, pareto, scaling, peers, stress or pictures; may be repeated (default: all, 30 "
-                 "minutes for six scenes on two cores)")
+                 "paper, pareto, scaling, peers, stress or pictures; may be repeated (default: all; of six "
+                 "scenes on two cores that is more than half an hour)")
       ->check(CLI::IsMember({"paper", "pareto", "scaling", "peers", "stress", "pictures"}));
-  app.add_flag("--quick", arguments.quick, "Fewer rays, bakes and sizes: under two minutes for six scenes");
+  app.add_flag("--quick", arguments.quick,
+               "Fewer rays, bakes, sizes and pictures: a few minutes for six scenes");
   app.add_flag("--large", arguments.large, "In the paper's table also what takes gigabytes a scene");
   app.add_flag("--no-vulkan", arguments.no_vulkan, "Measure the CPU only");
   app.add_option("--threads", arguments.threads, "What 'all threads' means (default: all)")

@@ -19,6 +19,7 @@ class OpenFile {
   const lsp_mapping& mapping() const { return mapping_; }
   const std::filesystem::path& path() const { return path_; }
   bool has_line_spaces() const { return scene_.header->required_features & LSP_FEATURE_LINE_SPACES; }
+  bool has_cells() const { return scene_.header->required_features & LSP_FEATURE_CELLS; }
   bool has_exact_tree() const { return scene_.header->required_features & LSP_FEATURE_EXACT; }
 
  private:

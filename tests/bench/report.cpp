@@ -4,7 +4,6 @@
 #include <cstdio>
 
 #include "escape.h"
-#include "image.h"
 #include "lsp/program.h"
 #include "output_file.h"
 
@@ -25,7 +24,6 @@ td.word,th.word{text-align:left}tr:nth-child(even) td{background:linear-gradient
 .warnings{padding:.5rem 1rem .5rem 2rem;border-left:4px solid #D55E00;background:var(--soft)}
 dl{display:grid;grid-template-columns:max-content 1fr;gap:.1rem 1rem;font-size:.875rem}dt{opacity:.7}dd{margin:0;overflow-wrap:anywhere}
 .pictures{display:grid;gap:.4rem}.pictures figure{margin:0}.pictures figcaption{font-size:.75rem;line-height:1.3}
-.legend{display:flex;align-items:center;gap:.5rem;font-size:.75rem}.legend i{flex:0 1 12rem;height:.8rem;display:block}
 nav a{margin-right:1rem}
 )";
 
@@ -77,20 +75,6 @@ std::string table_html(const Table& table) {
   return html + "</tbody></table></div>\n";
 }
 
-std::string legend_html(const std::string& end) {
-  std::string gradient;
-  constexpr int kStops = 8;
-  for (int k = 0; k <= kStops; ++k) {
-    const glm::vec3 colour = 255.0f * heat_colour(static_cast<float>(k) / kStops);
-    char text[48];
-    std::snprintf(text, sizeof text, ",rgb(%d,%d,%d)", static_cast<int>(colour.r), static_cast<int>(colour.g),
-                  static_cast<int>(colour.b));
-    gradient += text;
-  }
-  return "<p class=legend>no difference <i style='background:linear-gradient(90deg" + gradient + ")'></i> " +
-         escape(end) + "</p>\n";
-}
-
 std::string grid_html(const PictureGrid& grid) {
   std::string html = "<h3>" + escape(grid.title) + "</h3>\n";
   if (!grid.caption.empty()) html += "<p class=caption>" + escape(grid.caption) + "</p>\n";
@@ -101,7 +85,7 @@ std::string grid_html(const PictureGrid& grid) {
             (picture.jpeg ? "jpeg" : "png") + ";base64," + base64(picture.bytes) + "'><figcaption>" +
             escape(picture.caption) + "</figcaption></figure>\n";
   }
-  return html + "</div></div>\n" + (grid.legend.empty() ? "" : legend_html(grid.legend));
+  return html + "</div></div>\n";
 }
 
 std::string list_html(const char* name, const std::vector<std::string>& items) {

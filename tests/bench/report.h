@@ -39,6 +39,7 @@ struct Series {
   std::string name;
   std::vector<Point> points;
   bool line = false;  // join the points in order
+  int kin = -1;       // the series whose colour this one has, by number; its line is dashed then. -1: its own
 };
 
 struct Plot {
@@ -62,7 +63,6 @@ struct PictureGrid {
   std::string caption;
   size_t columns = 1;
   std::vector<Picture> pictures;
-  std::string legend;  // what the right end of the heat maps' scale means; empty: there are no heat maps
 };
 
 struct Section {

@@ -55,6 +55,23 @@ Triangles room_of_spheres(size_t triangles) {
   return out;
 }
 
+Soup soup_of(const Triangles& triangles) {
+  Soup soup;
+  soup.corners = triangles;
+  soup.lo = glm::dvec3(INFINITY);
+  soup.hi = glm::dvec3(-INFINITY);
+  for (uint32_t i = 0; i < triangles.size(); ++i) {
+    soup.primitives.push_back(i);
+    soup.triangle_of.push_back(i);
+    for (const glm::vec3& corner : triangles[i]) {
+      soup.lo = glm::min(soup.lo, glm::dvec3(corner));
+      soup.hi = glm::max(soup.hi, glm::dvec3(corner));
+    }
+  }
+  soup.diagonal = glm::length(soup.hi - soup.lo);
+  return soup;
+}
+
 void write_ply(const std::filesystem::path& path, const Triangles& triangles) {
   std::ofstream out(path, std::ios::binary);
   out << "ply\nformat binary_little_endian 1.0\nelement vertex " << 3 * triangles.size()

@@ -6,6 +6,8 @@
 #include <glm/glm.hpp>
 #include <vector>
 
+#include "soup.h"
+
 namespace lsp::bench {
 
 using Triangles = std::vector<std::array<glm::vec3, 3>>;
@@ -18,6 +20,9 @@ void add_sphere(Triangles& out, int n, glm::vec3 centre, float radius);
 
 // A room seen from inside with 27 spheres in it, of about `triangles` triangles (at least some 700).
 Triangles room_of_spheres(size_t triangles);
+
+// The triangles as an importer would number them.
+Soup soup_of(const Triangles& triangles);
 
 // A binary PLY of unshared corners. Throws Failure(kFile).
 void write_ply(const std::filesystem::path& path, const Triangles& triangles);

@@ -1,8 +1,11 @@
-// Run time against error against bytes: every bake crossed with every way to trace it, and the frontier.
+// Run time against error against bytes: the dial of cells, and every bake of Line Spaces crossed with every
+// way to trace it, and the frontier.
 #include <algorithm>
 #include <cmath>
 
 #include "context.h"
+#include "dial_curve.h"
+#include "pareto_plots.h"
 #include "ray_errors.h"
 #include "wide_peer.h"
 
@@ -91,7 +94,7 @@ ScenePeers measure_peers(Context& context, SceneUnderTest& scene, const RaySet& 
     if (tree.available) peers.exact_megabytes = static_cast<double>(tree.file_bytes) * 1e-6;
   }
   const OpenFile file(scene.base().path);
-  if (is_ntree(file)) return peers;
+  if (file.scene().header->base_structure != LSP_BASE_BVH) return peers;
   const WideTree wide(file);
   const std::unique_ptr<Tracer> tracers[] = {
       cpu_tracer(file, context.threads),
@@ -111,7 +114,8 @@ struct Sweep {
   std::vector<Sample> samples;
   std::vector<Json> rows;  // of the samples
   std::vector<std::string> left_out;
-  size_t uncertain = 0;  // ratios that their spread makes meaningless
+  std::map<std::string, double> vulkan_exact;  // seconds of the device for the BVH's exact rays, by scene
+  size_t uncertain = 0;                        // ratios that their spread makes meaningless
 };
 
 void sweep_scene(Context& context, SceneUnderTest& scene, Sweep& sweep) {
@@ -150,7 +154,8 @@ void sweep_scene(Context& context, SceneUnderTest& scene, Sweep& sweep) {
       // A quarter of the rays: a software device takes its time, and the ratio is all that is wanted.
       on_vulkan =
           context.race_on_vulkan(*vulkan, modes, std::span(set.rays).first(set.rays.size() / 4), 3, what);
-      if (!on_vulkan.empty() && !is_ntree(file)) vulkan_exact = on_vulkan[0].median;
+      if (!on_vulkan.empty() && !is_ntree(file))
+        sweep.vulkan_exact[scene.name()] = vulkan_exact = on_vulkan[0].median;
     }
     for (size_t m = 1; m < modes.size(); ++m) {
       const RayErrors errors = ray_errors(scene.soup(), set.rays, set.truth, hits[m]);
@@ -185,60 +190,35 @@ void sweep_scene(Context& context, SceneUnderTest& scene, Sweep& sweep) {
   }
 }
 
-std::vector<Plot> plots_of(const Context& context, const std::vector<Sample>& samples,
-                           const std::vector<bool>& best) {
-  Plot speed{"pareto_wrong",
-             "Speed against wrong answers",
-             "Up and left is better.",
-             {"wrong answers, % of rays", true},
-             {"times the exact trace", false},
-             {}};
-  Plot depth{"pareto_depth",
-             "Speed against depth error",
-             "Up and left is better.",
-             {"mean depth error, % of the diagonal", true},
-             {"times the exact trace", false},
-             {}};
-  Plot bytes{"pareto_bytes",     "Wrong answers against bytes",      "Down and left is better.",
-             {"file, MB", true}, {"wrong answers, % of rays", true}, {}};
-  Plot curve{"pareto_frontier",
-             "The frontier of each scene",
-             "What nothing else of the scene beats in both.",
-             {"wrong answers, % of rays", true},
-             {"times the exact trace", false},
-             {}};
-  for (const auto& scene : context.scenes) {
-    Series s{scene->name(), {}, false}, d = s, b = s, f{scene->name(), {}, true};
-    for (size_t i = 0; i < samples.size(); ++i) {
-      const Sample& sample = samples[i];
-      if (sample.scene != scene->name()) continue;
-      const std::string label = sample.bake + ", " + sample.mode;
-      s.points.push_back({std::max(sample.wrong_percent, 1e-3), sample.times, label});
-      d.points.push_back({std::max(sample.depth_percent, 1e-4), sample.times, label});
-      b.points.push_back({sample.megabytes, std::max(sample.wrong_percent, 1e-3), label});
-      if (best[i]) f.points.push_back(s.points.back());
-    }
-    std::sort(f.points.begin(), f.points.end(), [](const Point& a, const Point& c) { return a.x < c.x; });
-    speed.series.push_back(s);
-    depth.series.push_back(d);
-    bytes.series.push_back(b);
-    curve.series.push_back(f);
-  }
-  return {curve, speed, depth, bytes};
-}
-
 }  // namespace
 
 Section pareto_suite(Context& context) {
   Section section{"pareto", "Run time against error", {}, {}, {}, {}};
   section.paragraphs.push_back(
-      "Every bake, traced in every way, on shuffled diffuse rays from what a camera sees, all threads. Speed "
+      "Cells at points of the dial from tables alone (max-loss 100) to nearly exact (0), against the exact "
+      "trace "
+      "of the same file, which walks wide nodes. Then every bake of Line Spaces, traced in every way; speed "
       "is "
-      "times the exact trace of the BVH in the same run, for NTrees too; wrong answers are rays that hit "
-      "where "
-      "truth misses or the reverse. On the frontier nothing else is both faster and less often wrong.");
+      "times the exact trace of the BVH in the same run, for NTrees too. Shuffled diffuse rays from what a "
+      "camera "
+      "sees and, of cells, area-weighted ones from all surfaces; all threads. Wrong answers are rays that "
+      "hit "
+      "where truth misses or the reverse. On the frontier nothing else is both faster and less often wrong; "
+      "in "
+      "its plot wide nodes are the yardstick of both.");
   Sweep sweep;
-  context.each_scene(section, [&](SceneUnderTest& scene) { sweep_scene(context, scene, sweep); });
+  DialCurves dial;
+  context.each_scene(section, [&](SceneUnderTest& scene) {
+    sweep_scene(context, scene, sweep);
+    context.guarded(section, scene.name() + ", cells", [&] {
+      context.say_what_cells_are(scene, section);
+      measure_dial(context, scene, dial);
+    });
+  });
+  for (const auto& [scene, seconds] : dial.vulkan_exact) {
+    const auto bvh = sweep.vulkan_exact.find(scene);
+    if (bvh != sweep.vulkan_exact.end()) context.answers.peers[scene].wide_vulkan = bvh->second / seconds;
+  }
   const std::vector<bool> best_wrong = frontier(sweep.samples, &Sample::wrong_percent);
   const std::vector<bool> best_depth = frontier(sweep.samples, &Sample::depth_percent);
   for (size_t i = 0; i < sweep.rows.size(); ++i) {
@@ -247,7 +227,7 @@ Section pareto_suite(Context& context) {
                                 : best_depth[i]                ? "depth"
                                                                : "";
   }
-  Table table{"pareto", "All combinations", "", {}, sweep.rows};
+  Table table{"pareto", "Line Spaces: all combinations", "", {}, sweep.rows};
   table.columns = {{"scene", "scene"},         {"bake", "bake"},
                    {"mode", "mode"},           {"frontier", "frontier"},
                    {"times", "x exact"},       {"times_vulkan", "x exact, Vulkan"},
@@ -283,9 +263,10 @@ Section pareto_suite(Context& context) {
     for (size_t i = 0; i < sweep.left_out.size(); ++i) text += (i ? "; " : "") + sweep.left_out[i];
     section.paragraphs.push_back(text + ".");
   }
-  section.plots = plots_of(context, sweep.samples, best_wrong);
+  section.plots = pareto_plots(context, dial, sweep.samples, best_wrong);
+  section.tables = {dial_table(dial), std::move(peers), std::move(table)};
   context.answers.samples = std::move(sweep.samples);
-  section.tables = {std::move(peers), std::move(table)};
+  context.answers.cells = std::move(dial.camera);
   return section;
 }
 

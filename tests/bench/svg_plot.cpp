@@ -138,9 +138,11 @@ std::string to_svg(const Plot& plot) {
 
   for (size_t s = 0; s < plot.series.size(); ++s) {
     const Series& series = plot.series[s];
-    const std::string colour = kColours[s % kColours.size()];
+    const bool kin = series.kin >= 0;
+    const std::string colour = kColours[(kin ? static_cast<size_t>(series.kin) : s) % kColours.size()];
     if (series.line && series.points.size() > 1) {
-      svg += "<path fill='none' stroke='" + colour + "' stroke-width='2.2' d='";
+      svg += "<path fill='none' stroke='" + colour + "' stroke-width='2.2'" +
+             (kin ? " stroke-dasharray='5 4'" : "") + " d='";
       for (size_t i = 0; i < series.points.size(); ++i) {
         svg += (i ? "L" : "M") + at(px(series.points[i].x)) + " " + at(py(series.points[i].y));
       }

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <map>
 
 #include "process.h"
 #include "report.h"
@@ -13,6 +14,49 @@ namespace lsp::bench {
 namespace {
 
 namespace fs = std::filesystem;
+
+// The rows of a table by their mode.
+std::map<std::string, Json> by_mode(const Json& table) {
+  std::map<std::string, Json> rows;
+  for (const Json& row : table) rows[row["mode"].get<std::string>()] = row;
+  return rows;
+}
+
+// The rows of a table where row[key] is `value`.
+Json rows_where(const Json& table, const char* key, const std::string& value) {
+  Json rows = Json::array();
+  for (const Json& row : table) {
+    if (row[key] == value) rows.push_back(row);
+  }
+  return rows;
+}
+
+// The dial's points for a set of rays, and that they are ordered as a dial is.
+void expect_a_dial(const Json& table, const std::string& rays) {
+  const auto points = by_mode(rows_where(table, "rays", rays));
+  ASSERT_EQ(points.size(), 12u) << rays;
+  const auto figure = [&](const std::string& mode, const char* key) {
+    return points.at(mode)[key].get<double>();
+  };
+  for (const auto& [mode, row] : points) {
+    for (const char* key : {"times", "times_embree", "mrays", "file_mb"}) {
+      EXPECT_GT(row[key].get<double>(), 0) << mode << " " << key;
+    }
+  }
+  EXPECT_LT(figure("exact", "wrong_percent"), 0.01);
+  EXPECT_EQ(figure("exact", "lookups"), 0);
+  EXPECT_EQ(figure("max-loss 100", "exact_calls"), 0) << "tables alone";
+  const char* const dial[] = {"max-loss 100", "max-loss 50", "max-loss 20", "max-loss 10",
+                              "max-loss 5",   "max-loss 2",  "max-loss 1",  "max-loss 0"};
+  for (size_t k = 1; k < std::size(dial); ++k) {
+    EXPECT_GE(figure(dial[k], "exact_calls"), figure(dial[k - 1], "exact_calls")) << dial[k];
+    EXPECT_LE(figure(dial[k], "wrong_percent"), figure(dial[k - 1], "wrong_percent") + 0.1) << dial[k];
+  }
+  EXPECT_GT(figure("max-loss 100", "wrong_percent"), figure("max-loss 0", "wrong_percent"));
+  EXPECT_LT(figure("max-loss 0", "wrong_percent"), 0.1);
+  EXPECT_LE(figure("accurate", "wrong_percent"), figure("fast", "wrong_percent"));
+  EXPECT_GE(figure("accurate", "exact_calls"), figure("fast", "exact_calls"));
+}
 
 class BenchProgram : public testing::Test {
  protected:
@@ -63,7 +107,20 @@ TEST_F(BenchProgram, WritesAReport) {
     EXPECT_TRUE(row["mode"] != "exact" || row["wrong_percent"].get<double>() < 0.01);
     EXPECT_GT(row["nodes"].get<double>() + row["shafts"].get<double>(), 1);
   }
-  for (const char* name : {"report.html", "report.json", "pareto.csv", "peers.csv", "pareto_frontier.svg"}) {
+  const Json& dial = json["sections"]["pareto"]["tables"]["pareto_dial"];
+  expect_a_dial(dial, "diffuse, shuffled");
+  expect_a_dial(dial, "surface");
+  const Json& fields = json["sections"]["peers"]["tables"]["peers_field"];
+  ASSERT_EQ(fields.size(), 4u) << "two sets of rays, a field and cells: " << run.output;
+  for (const Json& row : fields) {
+    for (const char* key : {"megabytes", "bake_seconds", "mrays", "steps", "depth_mean_percent"})
+      EXPECT_GT(row[key].get<double>(), 0) << row.dump();
+    EXPECT_LT(row["wrong_percent"].get<double>(), 10) << row.dump();
+    const bool is_field = row["peer"].get<std::string>().find("distance field") == 0;
+    EXPECT_EQ(row.contains("threshold"), is_field);
+  }
+  for (const char* name : {"report.html", "report.json", "pareto.csv", "peers.csv", "pareto_frontier.svg",
+                           "pareto_dial.csv", "pareto_dial_surface.svg", "peers_field.csv"}) {
     EXPECT_TRUE(fs::exists(out / name)) << name;
   }
 }
@@ -90,9 +147,9 @@ TEST_F(BenchProgram, OneSceneThatFailsDoesNotEndTheRun) {
   EXPECT_EQ(json["warnings"].dump().find("earlier run"), std::string::npos);
   EXPECT_GT(json["sections"]["cost"]["tables"]["costs"].size(), 1u);
   // Once more: the bakes are there, and the report says so. Another input of that name is baked anew.
-  EXPECT_NE(bench(command).output.find("Of 2 bakes 2 are from an earlier run"), std::string::npos);
+  EXPECT_NE(bench(command).output.find("Of 4 bakes 4 are from an earlier run"), std::string::npos);
   write_ply(good, room_of_spheres(1500));
-  EXPECT_NE(bench(command).output.find("Of 2 bakes 1 are from an earlier run"), std::string::npos);
+  EXPECT_NE(bench(command).output.find("Of 4 bakes 2 are from an earlier run"), std::string::npos);
 }
 
 TEST_F(BenchProgram, MeasuresAFileAsItIs) {
@@ -105,10 +162,69 @@ TEST_F(BenchProgram, MeasuresAFileAsItIs) {
   const ProcessResult run = bench({baked.string(), "-o", out.string(), "--quick", "--quiet", "--no-vulkan",
                                    "--suite", "peers", "--suite", "pictures"});
   EXPECT_EQ(run.exit_code, 0) << run.errors;
-  EXPECT_TRUE(fs::exists(out / "room-ao-bvh-heat.jpg"));
-  EXPECT_FALSE(fs::exists(directory_ / "room-polished.lsp"));
+  EXPECT_TRUE(fs::exists(out / "room-wide-ao-short-line-spaces-difference.jpg"));
   EXPECT_EQ(run.output, "");
   EXPECT_TRUE(fs::exists(out / "report.html"));
+}
+
+TEST_F(BenchProgram, MeasuresTheDialOfAFileOfCells) {
+  const fs::path input = directory_ / "room.ply", baked = directory_ / "room.lsp", out = directory_ / "out";
+  write_ply(input, room_of_spheres(2000));
+  ASSERT_EQ(run_process({program_path("lsp-bake").string(), input.string(), "-o", baked.string(), "--quiet",
+                         "--preset", "fast", "--cells", "6"})
+                .exit_code,
+            0);
+  const ProcessResult run = bench({baked.string(), "-o", out.string(), "--quick", "--json", "--no-vulkan",
+                                   "--suite", "pareto", "--suite", "peers", "--suite", "pictures"});
+  ASSERT_EQ(run.exit_code, 0) << run.errors;
+  const Json json = Json::parse(run.output);
+  expect_a_dial(json["sections"]["pareto"]["tables"]["pareto_dial"], "diffuse, shuffled");
+  EXPECT_EQ(json["sections"]["pareto"]["tables"]["pareto"].size(), 0u) << "there are no Line Spaces";
+  EXPECT_EQ(by_mode(json["sections"]["pictures"]["tables"]["pictures"]).size(), 4u);
+  const Json fields = json["sections"]["peers"]["tables"]["peers_field"];
+  EXPECT_EQ(fields.size(), 2u) << "of each set of rays the field alone";
+  EXPECT_NE(json["answers"].dump().find("point of the dial of cells"), std::string::npos);
+}
+
+TEST_F(BenchProgram, PicturesAreOfCells) {
+  const fs::path input = directory_ / "room.ply", out = directory_ / "out";
+  write_ply(input, room_of_spheres(3000));
+  const ProcessResult run =
+      bench({input.string(), "-o", out.string(), "--quick", "--json", "--no-vulkan", "--suite", "pictures"});
+  ASSERT_EQ(run.exit_code, 0) << run.errors;
+  const Json tables = Json::parse(run.output)["sections"]["pictures"]["tables"];
+  const auto same = by_mode(tables["pictures"]);
+  ASSERT_EQ(same.size(), 5u) << "four points of the dial and Line Spaces";
+  for (const auto& [mode, row] : same) {
+    EXPECT_EQ(row["scene"], "room");
+    EXPECT_EQ(row["light"], "ao-short");
+    for (const char* key : {"seconds", "exact_seconds", "times"}) EXPECT_GT(row[key].get<double>(), 0) << key;
+    for (const char* key : {"p99_percent", "blurred_p99_percent", "bias_percent", "ssim"})
+      EXPECT_TRUE(row.contains(key));
+    EXPECT_LE(row["blurred_percent"].get<double>(), row["mean_percent"].get<double>() * 1.001) << mode;
+    EXPECT_LE(row["structure"].get<double>(), 1.001) << mode;
+    EXPECT_GE(row["flip"].get<double>(), 0) << mode;
+  }
+  const auto error = [&](const char* mode) { return same.at(mode)["mean_percent"].get<double>(); };
+  EXPECT_GT(error("fast"), 0);
+  EXPECT_LE(error("balanced"), error("fast"));
+  EXPECT_LE(error("accurate"), error("balanced"));
+  EXPECT_LE(error("max-loss 0"), error("accurate"));
+
+  const auto equal = by_mode(tables["pictures_equal_time"]);
+  ASSERT_EQ(equal.size(), 3u);
+  for (const auto& [mode, row] : equal) {
+    EXPECT_GE(row["exact_samples"].get<int>(), 1) << mode;
+    EXPECT_GT(row["exact_mean_percent"].get<double>(), 0) << mode;
+    // Fewer samples are noise: less of it is left by a blur than of the error of tables.
+    EXPECT_LT(row["exact_structure"].get<double>(), 0.6) << mode;
+  }
+  for (const char* name : {"exact", "fast", "balanced", "accurate"}) {
+    const std::string id = std::string("room-wide-ao-short-") + name;
+    EXPECT_TRUE(fs::exists(out / (id + ".jpg"))) << id;
+    EXPECT_TRUE(fs::exists(out / (id + "-difference.jpg"))) << id;
+    EXPECT_TRUE(fs::exists(out / (id + "-detail.png"))) << id;
+  }
 }
 
 }  // namespace

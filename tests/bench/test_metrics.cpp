@@ -7,6 +7,7 @@
 
 #include "image.h"
 #include "lsp/program.h"
+#include "picture_errors.h"
 #include "random.h"
 #include "ray_errors.h"
 
@@ -26,17 +27,6 @@ Image pattern(bool changed) {
     }
   }
   return image;
-}
-
-TEST(Image, RmseBiasAndPsnr) {
-  const Image a(4, 4, glm::vec3(0.5f)), b(4, 4, glm::vec3(0.25f));
-  EXPECT_DOUBLE_EQ(rmse(a, b), 0.25);
-  EXPECT_DOUBLE_EQ(bias(a, b), -0.25);
-  EXPECT_NEAR(psnr(a, b), 12.0412, 1e-4);
-  EXPECT_EQ(psnr(a, a), INFINITY);
-  EXPECT_NEAR(rmse(pattern(false), pattern(true)), 0.22030038632904758, 1e-6);
-  EXPECT_NEAR(bias(pattern(false), pattern(true)), -0.015595238095238094, 1e-7);
-  EXPECT_THROW(rmse(a, Image(4, 5)), Failure);
 }
 
 TEST(Image, StructuralSimilarity) {
@@ -75,7 +65,7 @@ TEST(Image, PfmAndPng) {
   EXPECT_EQ(encode_jpeg(pattern(false)).substr(0, 2), "\xff\xd8");
 }
 
-TEST(Image, DetailsAndHeat) {
+TEST(Image, Details) {
   Image image = pattern(false);
   const Image part = crop(image, 10, 20, 8, 6);
   EXPECT_EQ(part.at(0, 0), image.at(10, 20));
@@ -88,13 +78,61 @@ TEST(Image, DetailsAndHeat) {
   EXPECT_EQ(image.at(7, 20), pattern(false).at(7, 20));
   draw_frame(image, 0, 0, 48, 40, red);  // has no room, draws nothing
   EXPECT_EQ(image.at(0, 0), pattern(false).at(0, 0));
-  float last = -1;
-  for (int k = 0; k <= 100; ++k) {  // brighter all the way
-    const glm::vec3 colour = heat_colour(static_cast<float>(k) / 100);
-    const float luma = glm::dot(colour, glm::vec3(0.2126f, 0.7152f, 0.0722f));
-    EXPECT_GT(luma, last);
-    last = luma;
+}
+
+// Grey, and one that differs by noise of mean magnitude `off`, or by a line one pixel wide.
+Image grey() { return Image(80, 60, glm::vec3(0.5f)); }
+Image noisy(float off) {
+  Image image = grey();
+  Random random(5);
+  for (glm::vec3& pixel : image.pixels)
+    pixel += glm::vec3(off * static_cast<float>(4 * random.uniform() - 2));
+  return image;
+}
+Image seamed(float off) {
+  Image image = grey();
+  for (uint32_t y = 0; y < image.height; ++y) image.at(37, y) += glm::vec3(off);
+  return image;
+}
+
+TEST(PictureErrors, ABlurTakesNoiseAndLeavesSeams) {
+  const PictureErrors noise = picture_errors(grey(), noisy(0.05f));
+  EXPECT_NEAR(noise.mean, 0.05 / 0.5, 0.003);
+  EXPECT_NEAR(noise.p99, 0.1 / 0.5, 0.005);
+  // A mean of 25 has a fifth of the deviation; the mean magnitude of a uniform value is 0.866 of its
+  // deviation, of the nearly normal sum 0.798.
+  EXPECT_NEAR(noise.structure(), 0.2 * 0.798 / 0.866, 0.02);
+  EXPECT_NEAR(noise.bias, 0, 0.004);
+
+  const PictureErrors seam = picture_errors(grey(), seamed(0.2f));
+  EXPECT_NEAR(seam.mean, 0.2 / 0.5 / 80, 1e-6);
+  EXPECT_NEAR(seam.p99, 0.2 / 0.5, 1e-6);  // one pixel in 80
+  EXPECT_NEAR(seam.blurred_mean, seam.mean, 1e-6);
+  EXPECT_NEAR(seam.blurred_p99, 0.2 / 0.5 / 5, 1e-6);
+  EXPECT_NEAR(seam.structure(), 1, 1e-5);
+  EXPECT_NEAR(seam.bias, seam.mean, 1e-6);
+}
+
+TEST(PictureErrors, AreRelativeToTheMeanButNotOfADarkPicture) {
+  const Image bright(9, 9, glm::vec3(0.8f)), dark(9, 9, glm::vec3(0.01f));
+  EXPECT_NEAR(picture_errors(bright, Image(9, 9, glm::vec3(0.6f))).mean, 0.25, 1e-6);
+  EXPECT_NEAR(picture_errors(bright, Image(9, 9, glm::vec3(0.6f))).bias, -0.25, 1e-6);
+  EXPECT_NEAR(picture_errors(dark, Image(9, 9, glm::vec3(0.06f))).mean, 0.05 / kLeastMean, 1e-6);
+  const PictureErrors none = picture_errors(dark, dark);
+  EXPECT_EQ(none.mean, 0);
+  EXPECT_EQ(none.structure(), 0);
+  EXPECT_THROW(picture_errors(bright, Image(9, 8)), Failure);
+}
+
+TEST(PictureErrors, ABlurKeepsWhatIsEvenUpToTheBorder) {
+  const Image even(7, 3, glm::vec3(0.3f, 0.5f, 0.7f));
+  for (const glm::vec3& pixel : blurred(even).pixels) {
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(pixel[c], even.pixels[0][c], 1e-6);
   }
+  Image dot(11, 11);
+  dot.at(5, 5) = glm::vec3(1);
+  EXPECT_NEAR(blurred(dot).at(3, 7).g, 1.0 / 25, 1e-7);
+  EXPECT_EQ(blurred(dot).at(2, 5).g, 0);
 }
 
 Soup quad() {

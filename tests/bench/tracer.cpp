@@ -54,6 +54,9 @@ class EmbreeTracer : public Tracer {
   unsigned threads_;
 };
 
+constexpr const char* kQualityNames[LSP_QUALITY_COUNT] = {"balanced", "fast",
+                                                          "accurate"};  // by LSP_QUALITY_*
+
 }  // namespace
 
 lsp_trace_options Mode::options() const {
@@ -63,16 +66,26 @@ lsp_trace_options Mode::options() const {
   if (near_approximate) options.flags |= LSP_TRACE_NEAR_APPROXIMATE;
   if (near_skip) options.flags |= LSP_TRACE_NEAR_SKIP;
   options.lod = lod;
+  options.quality = quality.value_or(LSP_QUALITY_BALANCED);
+  if (max_loss) {
+    options.flags |= LSP_TRACE_MAX_LOSS;
+    options.max_loss = *max_loss;
+  }
   return options;
 }
 
 std::string Mode::name() const {
   if (!approximate) return "exact";
+  char number[32];
+  if (max_loss) {
+    std::snprintf(number, sizeof number, "max-loss %g", double{*max_loss});
+    return number;
+  }
+  if (quality) return kQualityNames[*quality];
   std::string text = near_approximate ? "approximate, near too"
                      : near_skip      ? "approximate, near skipped"
                                       : "approximate";
   if (lod > 0) {
-    char number[32];
     std::snprintf(number, sizeof number, ", lod %g", double{lod});
     text += number;
   }
@@ -97,7 +110,8 @@ Work count_work(const OpenFile& file, const Mode& mode, std::span<const LspRay> 
         file);
   const auto n = static_cast<double>(rays.empty() ? 1 : rays.size());
   return {static_cast<double>(counts.nodes) / n, static_cast<double>(counts.shafts) / n,
-          static_cast<double>(counts.triangles) / n};
+          static_cast<double>(counts.triangles) / n, static_cast<double>(counts.splits) / n,
+          static_cast<double>(counts.exact) / n};
 }
 
 }  // namespace lsp::bench

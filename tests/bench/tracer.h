@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -18,9 +19,12 @@ struct Mode {
   bool near_approximate = false;
   bool near_skip = false;
   float lod = 0;
+  std::optional<uint32_t> quality =
+      std::nullopt;                              // of cells: LSP_QUALITY_*; none: the library's own, balanced
+  std::optional<float> max_loss = std::nullopt;  // of cells, in per cent, in place of a quality
 
   lsp_trace_options options() const;
-  std::string name() const;  // "exact", "approximate, near exact, lod 0.05"
+  std::string name() const;  // "exact", "approximate, lod 0.05", "accurate", "max-loss 5"
 };
 
 class Tracer {
@@ -37,7 +41,8 @@ std::unique_ptr<Tracer> embree_tracer(const EmbreeScene& scene, EmbreeCall call,
 
 // Per-ray means of the work done, on the CPU; noise-free.
 struct Work {
-  double nodes = 0, shafts = 0, triangles = 0;
+  double nodes = 0, shafts = 0, triangles = 0;  // nodes: of cells the steps from one to the next
+  double splits = 0, exact_calls = 0;           // of cells alone
 };
 Work count_work(const OpenFile& file, const Mode& mode, std::span<const LspRay> rays);
 
