@@ -230,7 +230,7 @@ int main(int argc, char** argv) {
   app.add_option(
          "--effect", a.effect,
          "What is shown: light (all of it, with one diffuse bounce), diffuse (the bounce alone), ao, or heat "
-         "(steps of the bounce's rays: black, red, yellow, from 256 on white) (default light)")
+         "(steps of the bounce's rays: black, red, yellow, from 128 on white) (default light)")
       ->check(CLI::IsMember(kEffects));
   app.add_option("--split", a.state.split,
                  "Where the line is, a share of the width: 0 all approximate, 1 all exact (default 0.5)")

@@ -17,7 +17,7 @@ constexpr double kSliceSeconds =
     0.03;  // far from where drivers give a device up, and short enough to hear keys
 constexpr double kMovingSeconds = 0.1;  // of a picture while the camera moves
 constexpr uint32_t kLargestScale = 8;
-constexpr float kHeatWhite = 256.0f;
+constexpr float kHeatWhite = 128.0f;
 
 auto fields(const lsp_trace_options& o) { return std::tie(o.flags, o.lod, o.quality, o.max_loss); }
 auto fields(const ViewState& s) { return std::tie(s.camera, s.effect, s.split, s.ao_distance, s.exposure); }
