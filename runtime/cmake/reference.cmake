@@ -5,8 +5,6 @@ if(NOT LSP_DOXYGEN)
 endif()
 set(LSP_REFERENCE_DIR ${PROJECT_BINARY_DIR}/reference)
 list(TRANSFORM headers PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/ OUTPUT_VARIABLE documented)
-list(APPEND documented ${PROJECT_SOURCE_DIR}/format-spec/include/lsp/program.h
-  ${PROJECT_SOURCE_DIR}/format-spec/include/lsp/version.h)
 list(TRANSFORM documented REPLACE "(.+)" "\"\\1\"")
 list(JOIN documented " " LSP_REFERENCE_INPUT)
 configure_file(reference/Doxyfile.in ${CMAKE_CURRENT_BINARY_DIR}/Doxyfile @ONLY)

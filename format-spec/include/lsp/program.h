@@ -11,7 +11,6 @@ namespace lsp {
 // The programs' own version; the format's is in layout.h.
 inline constexpr const char* kProgramVersion = LSP_LIBRARY_VERSION_STRING;
 
-// Exit codes of the programs.
 enum class Exit : int {
   kDone = 0,
   kUsage = 1,        // the command line is wrong
@@ -27,12 +26,9 @@ enum class Exit : int {
 // printed as "PROGRAM: FILE: MESSAGE". `file` may be empty where no file is at fault.
 class Failure : public std::runtime_error {
  public:
-  // As above; `message` without the names of program and file.
   Failure(Exit exit, std::string file, const std::string& message)
       : std::runtime_error(message), exit_(exit), file_(std::move(file)) {}
-  // The code to end with.
   Exit exit() const { return exit_; }
-  // The file at fault, or empty.
   const std::string& file() const { return file_; }
 
  private:

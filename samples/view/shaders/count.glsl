@@ -1,5 +1,4 @@
-/* What is counted of indirect light. Straight into the buffer: a sum of the work group's first would need barriers,
- * with which some devices trace many times slower. */
+/* What is counted of indirect light. */
 void count_ray(LspHit hit) {
   atomicAdd(statistics[region.part].rays, 1u);
   if ((hit.flags & LSP_HIT_INCOMPLETE) != 0u) atomicAdd(statistics[region.part].incomplete, 1u);
