@@ -23,7 +23,7 @@ started=$SECONDS
 # What only the tests need: Debian packages are made, with manual pages; a project is built with Make; shaders become
 # HLSL and Metal's language; sources are formatted; a bake is divided by GNU parallel. And where nothing of the kind is
 # there: the second reader runs on Node.js, the fuzzers are built with Clang.
-extra=(clang-format-14 dpkg-dev file help2man make parallel spirv-cross)
+extra=(clang-format-14 doxygen dpkg-dev file help2man make parallel spirv-cross xvfb)
 command -v npm >/dev/null || extra+=(nodejs npm)
 command -v clang++-14 >/dev/null || extra+=(clang-14)
 compgen -G '/usr/lib/llvm-14/lib/clang/*/lib/linux/libclang_rt.fuzzer-*.a' >/dev/null || extra+=(libclang-rt-14-dev)

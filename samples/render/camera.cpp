@@ -63,6 +63,18 @@ std::string to_string(const Camera& c) {
   return text;
 }
 
+glm::ivec2 parse_size(const std::string& text) {
+  glm::ivec2 size(0);
+  int used = 0;
+  const int count = std::sscanf(text.c_str(), "%dx%d%n", &size.x, &size.y, &used);
+  constexpr int kLargest = 16384;
+  if (count != 2 || static_cast<size_t>(used) != text.size() || size.x < 1 || size.y < 1 ||
+      size.x > kLargest || size.y > kLargest) {
+    throw Failure(Exit::kUsage, "", "--size '" + text + "' is not WIDTHxHEIGHT, each from 1 to 16384");
+  }
+  return size;
+}
+
 Camera default_camera(const RenderScene& scene, RayTracer& tracer, Lamp& lamp) {
   lamp = {};
   const glm::vec3 size = scene.hi() - scene.lo();
@@ -117,6 +129,20 @@ Camera default_camera(const RenderScene& scene, RayTracer& tracer, Lamp& lamp) {
   camera.eye = centre + glm::normalize(glm::vec3(0.6f, 0.42f, 1.0f)) *
                             (0.58f * diagonal / std::sin(19.0f * kPi / 180.0f));
   return camera;
+}
+
+bool suit(Sky& sky, const Lamp& lamp, const RenderScene& scene) {
+  if (lamp.radius == 0) {
+    // Out in the open nothing takes light away, as walls do: the same sky would be glaring.
+    sky.brightness *= 0.4f;
+    sky.sun_irradiance *= 0.4f;
+    return false;
+  }
+  if (scene.has_emitters()) return false;
+  sky.lamp_position = lamp.position;
+  sky.lamp_radius = lamp.radius;
+  sky.lamp_intensity = glm::vec3(1.0f, 0.9f, 0.75f) * lamp.intensity;
+  return true;
 }
 
 }  // namespace lsp::sample

@@ -34,16 +34,6 @@ struct Arguments {
   RenderOptions options;
 };
 
-void parse_size(const std::string& text, RenderOptions& options) {
-  int used = 0;
-  const int count = std::sscanf(text.c_str(), "%dx%d%n", &options.width, &options.height, &used);
-  constexpr int kLargest = 16384;
-  if (count != 2 || static_cast<size_t>(used) != text.size() || options.width < 1 || options.height < 1 ||
-      options.width > kLargest || options.height > kLargest) {
-    throw Failure(Exit::kUsage, "", "--size '" + text + "' is not WIDTHxHEIGHT, each from 1 to 16384");
-  }
-}
-
 Sky parse_sun(const std::string& text) {
   Sky sky;
   if (text.empty()) return sky;
@@ -122,7 +112,9 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
   options.indirect = to_trace_options(arguments.trace, approximate);
   if (approximate) options.verify = arguments.verify_percent / 100.0f;
   options.light = light_options(arguments, approximate);
-  parse_size(arguments.size, options);
+  const glm::ivec2 size = parse_size(arguments.size);
+  options.width = size.x;
+  options.height = size.y;
   for (const std::string& output : arguments.outputs) {
     const std::filesystem::path ending = std::filesystem::path(output).extension();
     if (ending != ".png" && ending != ".pfm") {
@@ -165,18 +157,9 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
   if (arguments.camera.empty()) {
     Lamp lamp;
     camera = default_camera(scene, *tracer, lamp);
-    if (lamp.radius == 0) {
-      // Out in the open nothing takes light away, as walls do: the same sky would be glaring.
-      sky.brightness *= 0.4f;
-      sky.sun_irradiance *= 0.4f;
-    } else if (!scene.has_emitters()) {
-      sky.lamp_position = lamp.position;
-      sky.lamp_radius = lamp.radius;
-      sky.lamp_intensity = glm::vec3(1.0f, 0.9f, 0.75f) * lamp.intensity;
-      if (!common.quiet) {
-        std::cerr << program << ": " << arguments.file
-                  << ": a hall without lights: a lamp hangs in its middle\n";
-      }
+    if (suit(sky, lamp, scene) && !common.quiet) {
+      std::cerr << program << ": " << arguments.file
+                << ": a hall without lights: a lamp hangs in its middle\n";
     }
   }
 

@@ -163,6 +163,18 @@ glm::vec3 above(const SurfacePoint& point, glm::vec3 direction) {
   return depth < 0 ? direction - 2.0f * depth * point.geometric_normal : direction;
 }
 
+std::vector<EmitterTriangle> RenderScene::emitters() const {
+  std::vector<EmitterTriangle> triangles;
+  for (const Emitter& emitter : emitters_) {
+    const Asset& asset = asset_of(emitter.instance);
+    const LspTriangle& triangle = asset.scene->triangles[emitter.triangle];
+    const Corners c = corners(emitter.instance, triangle);
+    const glm::vec3 radiance = share_there(triangle) * to_glm(asset.materials[triangle.material].emission);
+    triangles.push_back({c.v0, c.e1, c.e2, radiance, emitter.cumulative, emitter.pdf});
+  }
+  return triangles;
+}
+
 EmitterPoint RenderScene::sample_emitter(float chance, glm::vec2 point) const {
   const auto found = std::lower_bound(emitters_.begin(), emitters_.end() - 1, chance,
                                       [](const Emitter& e, float value) { return e.cumulative <= value; });

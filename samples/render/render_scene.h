@@ -39,6 +39,16 @@ struct EmitterPoint {
   float pdf = 0.0f;  // per area
 };
 
+// A light-emitting triangle and how often it is chosen.
+struct EmitterTriangle {
+  glm::vec3 corner;
+  glm::vec3 edge1;
+  glm::vec3 edge2;
+  glm::vec3 radiance;
+  float cumulative;  // of area times luminance, up to and with this one, over the total
+  float pdf;         // per area
+};
+
 // Owns the files.
 class RenderScene {
  public:
@@ -70,6 +80,13 @@ class RenderScene {
 
   // The point that `ray` hits; `hit` must be a hit of this scene.
   SurfacePoint surface(const LspRay& ray, const LspHit& hit) const;
+
+  // Of a scene of one file, what a device needs for the same: the LspTriangle of each primitive (LSP_NONE: it
+  // was dropped), and at least one material.
+  std::span<const uint32_t> triangles_of_primitives() const { return assets_.front().triangle_of_primitive; }
+  std::span<const LspMaterial> materials() const { return assets_.front().materials; }
+  // The light-emitting triangles, in the order in which sample_emitter looks for them.
+  std::vector<EmitterTriangle> emitters() const;
 
   bool has_emitters() const { return !emitters_.empty(); }
   // `chance` picks the triangle, `point` the place on it; all in [0, 1).

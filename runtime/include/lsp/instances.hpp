@@ -17,11 +17,12 @@ namespace lsp {
 template <class T>
 class View {
  public:
-  View(T* data, size_t size) : data_(data), size_(size) {}
+  View(T* data, size_t size) : data_(data), size_(size) {}  // `size` elements from `data` on
+  // All of a range that has data and size.
   template <class Range>
   View(Range&& range) : data_(std::data(range)), size_(std::size(range)) {}
-  T* data() const { return data_; }
-  size_t size() const { return size_; }
+  T* data() const { return data_; }      // the first
+  size_t size() const { return size_; }  // how many
 
  private:
   T* data_;
@@ -35,14 +36,15 @@ class Instances {
  public:
   // No instances: every ray misses.
   Instances() = default;
+  // Of these scenes, built at once; as build.
   Instances(std::vector<const lsp_scene*> assets, View<const lsp_instance> instances)
       : assets_(std::move(assets)) {
     build(instances);
   }
   Instances(const Instances&) = delete;  // the view would be of the other's memory
   Instances& operator=(const Instances&) = delete;
-  Instances(Instances&&) = default;  // what is left may be destroyed or assigned to
-  Instances& operator=(Instances&&) = default;
+  Instances(Instances&&) = default;             // what is left may be destroyed or assigned to
+  Instances& operator=(Instances&&) = default;  // as of the other
 
   // The scenes named by lsp_instance.asset; they must outlive this.
   const std::vector<const lsp_scene*>& assets() const { return assets_; }
@@ -69,9 +71,10 @@ class Instances {
     if (status != LSP_OK) throw Failure(static_cast<Exit>(status), "", error.message);
   }
 
-  const lsp_instances& view() const { return view_; }
+  const lsp_instances& view() const { return view_; }  // good until the next build
+  // An instance as it was given, by its number.
   const lsp_instance& operator[](uint32_t number) const { return view_.records[number].instance; }
-  uint32_t size() const { return view_.count; }
+  uint32_t size() const { return view_.count; }  // how many there are
 
  private:
   struct alignas(16) Block {

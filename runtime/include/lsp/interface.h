@@ -7,12 +7,12 @@
 
 /* A ray; t counts in lengths of the direction. A hit needs tmin < t < tmax. */
 LSP_BEGIN(LspRay)
-  LSP_VEC3 origin;
-  LSP_FLOAT tmin;
-  LSP_VEC3 direction;
-  LSP_FLOAT tmax;
+  LSP_VEC3 origin;    /* in scene space */
+  LSP_FLOAT tmin;     /* at most tmax */
+  LSP_VEC3 direction; /* of any length but zero */
+  LSP_FLOAT tmax;     /* infinity: as far as there is */
 LSP_END(LspRay)
-
+/* What a ray has met; primitive is LSP_NONE where it is nothing. */
 LSP_BEGIN(LspHit)
   LSP_FLOAT t;        /* infinity: no hit */
   LSP_UINT primitive; /* in import order; LSP_NONE: no hit */
@@ -22,7 +22,7 @@ LSP_BEGIN(LspHit)
   LSP_UINT flags;     /* LSP_HIT_* in bits 0 to 7; from bit 8 on the instance's number, where there are instances */
 LSP_END(LspHit)
 
-#define LSP_HIT_INSTANCE_SHIFT 8u
+#define LSP_HIT_INSTANCE_SHIFT 8u /* of LspHit.flags: the instance's number begins here */
 
 #define LSP_HIT_LINE_SPACE 0x1u    /* answered by a Line Space */
 #define LSP_HIT_ORIGIN_INSIDE 0x2u /* the origin lies inside that Line Space's node */
@@ -98,8 +98,8 @@ LSP_END(LspHit)
 /* Push constants, compute stage, from offset 0: rays [first, first + count) of the buffers. */
 LSP_BEGIN(lsp_vulkan_trace_constants)
   LSP_FLOAT lod; /* as in lsp_trace_options */
-  LSP_UINT first;
-  LSP_UINT count;
+  LSP_UINT first; /* ray */
+  LSP_UINT count; /* of rays, one an invocation */
   LSP_UINT dial; /* lsp_dial */
 LSP_END(lsp_vulkan_trace_constants)
 

@@ -25,7 +25,7 @@ extern "C" {
 /* LSP_LIBRARY_VERSION of the library that is linked. It fits this header where major and minor are the
  * header's. */
 LSP_API uint32_t lsp_version(void);
-
+/* What a function answers; the numbers are the programs' exit codes. */
 typedef enum lsp_status {
   LSP_OK = 0,
   LSP_ERROR_FILE = 2,        /* the file cannot be read */
@@ -37,9 +37,9 @@ typedef enum lsp_status {
 /* A status in a few words, for logs: "the file cannot be read". Of any value; it lives as long as the
  * program. What was wrong in particular is in lsp_error. */
 LSP_API const char* lsp_status_string(lsp_status status);
-
+/* Why a function failed, written only by those that take one; LSP_OK and an empty message on success. */
 typedef struct lsp_error {
-  lsp_status status;
+  lsp_status status; /* the one that was returned */
   uint64_t offset;   /* byte offset in the file of what is wrong, 0 where there is none */
   char message[192]; /* what is wrong and what to do, zero-terminated */
 } lsp_error;
@@ -48,14 +48,14 @@ typedef struct lsp_error {
 
 /* A file mapped read-only. `bytes` is page-aligned. */
 typedef struct lsp_mapping {
-  const void* bytes;
-  uint64_t size;
+  const void* bytes; /* NULL: nothing is mapped */
+  uint64_t size;     /* of the file, in bytes */
 } lsp_mapping;
 
 /* Maps the file at `path`. On success the caller owns the mapping and ends it with lsp_unmap_file. `error`
  * may be NULL here and everywhere below. */
 LSP_API lsp_status lsp_map_file(const char* path, lsp_mapping* mapping, lsp_error* error);
-LSP_API void lsp_unmap_file(lsp_mapping* mapping);
+LSP_API void lsp_unmap_file(lsp_mapping* mapping); /* clears it, too; an empty one is left alone */
 
 /* Sections a file may have at most; lsp_open compares each with all others. */
 #define LSP_MAX_SECTIONS 256u
@@ -65,9 +65,9 @@ LSP_API void lsp_unmap_file(lsp_mapping* mapping);
 /* A view of an open file: pointers into the caller's bytes, nothing owned. Arrays that the file does not
  * have, or that were not asked for, are NULL with a count of 0 in the header's sense. */
 typedef struct lsp_scene {
-  const void* bytes;
-  uint64_t size;
-  const LspHeader* header;
+  const void* bytes;          /* of the whole file, the caller's */
+  uint64_t size;              /* in bytes */
+  const LspHeader* header;    /* at bytes */
   const LspSection* sections; /* header->section_count of them */
   /* One pointer a section (lsp/sections.def): nodes or, of an NTree, grid, cells, references; of cells
    * besides nodes cell_words, filled_cells, entries, planes, plane_records, splits, cell_nodes,
@@ -107,7 +107,7 @@ LSP_API lsp_status lsp_unpack(const void* bytes, uint64_t size, void* out, uint6
 /* ---- tracing on the CPU ---- */
 
 #ifdef __cplusplus
-#define LSP_DEFAULT(value) = value
+#define LSP_DEFAULT(value) = value /* of a member in C++; C has none */
 #else
 #define LSP_DEFAULT(value)
 #endif
@@ -128,9 +128,9 @@ LSP_API uint32_t lsp_dial(const lsp_scene* scene, const lsp_trace_options* optio
 
 /* Sums over the rays traced. */
 typedef struct lsp_trace_counts {
-  uint64_t rays;
+  uint64_t rays;    /* traced, invalid ones included */
   uint64_t invalid; /* rays with a non-finite component, a zero direction or tmin > tmax: misses */
-  uint64_t hits;
+  uint64_t hits;    /* rays that met something */
   uint64_t
       nodes; /* LspNode visited (two boxes each); NTree and cells: cells stepped through, empty ones too */
   uint64_t shafts;      /* Line Space look-ups */

@@ -37,25 +37,25 @@ typedef struct lsp_instance_record {
   double inverse[9];     /* scene to object space, rows, without the translation */
   double translation[3]; /* where in the scene the point lies that the asset's positions are relative to */
   float lo[3];           /* box in scene space that holds the asset */
-  float hi[3];
-  uint32_t reserved[2]; /* zero */
+  float hi[3];           /* its other corner */
+  uint32_t reserved[2];  /* zero */
 } lsp_instance_record;
 
 /* A node of the tree over instances; its children lie side by side. */
 typedef struct lsp_instance_node {
-  float lo[3];
+  float lo[3];    /* box of what is below, in scene space */
   uint32_t child; /* the first of two nodes; with bit 31 set the number of an instance */
-  float hi[3];
-  float growth; /* the largest of the instances below */
+  float hi[3];    /* its other corner */
+  float growth;   /* the largest of the instances below */
 } lsp_instance_node;
 
 /* Instances ready for rays: a view of the caller's memory and assets, nothing owned. */
 typedef struct lsp_instances {
-  const lsp_scene* const* assets;
+  const lsp_scene* const* assets;     /* as given */
   const lsp_instance_record* records; /* `count` of them, in the order given */
   const lsp_instance_node* nodes;     /* the root first; 2 count - 1 */
-  uint32_t asset_count;
-  uint32_t count;
+  uint32_t asset_count;               /* of assets */
+  uint32_t count;                     /* of instances */
 } lsp_instances;
 
 /* Bytes that lsp_instances_build needs for `count` instances: 260 each. */

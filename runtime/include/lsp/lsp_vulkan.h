@@ -59,17 +59,17 @@ typedef struct lsp_vulkan_limits {
 
 /* One buffer of the scene: file bytes [file_offset, file_offset + bytes) as they are. */
 typedef struct lsp_vulkan_buffer {
-  uint32_t binding; /* LSP_BINDING_* */
-  uint32_t section; /* LSP_SECTION_*, 0: the header */
-  uint64_t file_offset;
-  uint64_t bytes; /* size of the buffer */
+  uint32_t binding;     /* LSP_BINDING_* */
+  uint32_t section;     /* LSP_SECTION_*, 0: the header */
+  uint64_t file_offset; /* of its first byte, in bytes */
+  uint64_t bytes;       /* size of the buffer */
 } lsp_vulkan_buffer;
 
 /* The buffers to make, in the order of the file; buffers[0] is the header's. */
 typedef struct lsp_vulkan_plan {
-  uint32_t buffer_count;
-  lsp_vulkan_buffer buffers[LSP_VULKAN_MAX_BUFFERS];
-  uint64_t bytes;           /* of all buffers together */
+  uint32_t buffer_count;                             /* of buffers in use */
+  lsp_vulkan_buffer buffers[LSP_VULKAN_MAX_BUFFERS]; /* what to make */
+  uint64_t bytes;                                    /* of all buffers together */
   VkBufferUsageFlags usage; /* of every buffer; an imported one can do without the transfer bit */
   uint32_t addresses; /* nonzero: the sections are read through addresses, see lsp_vulkan_address_table */
   uint32_t base_structure; /* LSP_BASE_*: the shader has to be made for it */
@@ -107,10 +107,10 @@ LSP_API lsp_status lsp_vulkan_check_import(const lsp_scene* scene, const lsp_vul
 
 /* A piece of the upload: `bytes` bytes at `source` go to offset `buffer_offset` of plan->buffers[buffer]. */
 typedef struct lsp_vulkan_copy {
-  uint32_t buffer;
-  uint64_t buffer_offset;
-  const void* source;
-  uint64_t bytes;
+  uint32_t buffer;        /* index of plan->buffers */
+  uint64_t buffer_offset; /* in bytes */
+  const void* source;     /* in the scene's bytes */
+  uint64_t bytes;         /* of the piece */
 } lsp_vulkan_copy;
 
 /* The piece after *cursor (0 at first, then left alone), at most max_bytes long; 0 when there is none left.
@@ -124,13 +124,13 @@ LSP_API int lsp_vulkan_next_copy(const lsp_scene* scene, const lsp_vulkan_plan* 
 
 /* The functions the library calls, of the engine's device. */
 typedef struct lsp_vulkan_functions {
-  PFN_vkCmdCopyBuffer cmd_copy_buffer;
-  PFN_vkCmdPipelineBarrier cmd_pipeline_barrier;
-  PFN_vkCmdBindPipeline cmd_bind_pipeline;
-  PFN_vkCmdBindDescriptorSets cmd_bind_descriptor_sets;
-  PFN_vkCmdPushConstants cmd_push_constants;
-  PFN_vkCmdDispatch cmd_dispatch;
-  PFN_vkUpdateDescriptorSets update_descriptor_sets;
+  PFN_vkCmdCopyBuffer cmd_copy_buffer;                  /* vkCmdCopyBuffer */
+  PFN_vkCmdPipelineBarrier cmd_pipeline_barrier;        /* vkCmdPipelineBarrier */
+  PFN_vkCmdBindPipeline cmd_bind_pipeline;              /* vkCmdBindPipeline */
+  PFN_vkCmdBindDescriptorSets cmd_bind_descriptor_sets; /* vkCmdBindDescriptorSets */
+  PFN_vkCmdPushConstants cmd_push_constants;            /* vkCmdPushConstants */
+  PFN_vkCmdDispatch cmd_dispatch;                       /* vkCmdDispatch */
+  PFN_vkUpdateDescriptorSets update_descriptor_sets;    /* vkUpdateDescriptorSets */
 } lsp_vulkan_functions;
 
 /* Fills *functions through the engine's vkGetDeviceProcAddr. LSP_ERROR_UNSUPPORTED if one is missing. */
@@ -178,7 +178,7 @@ LSP_API void lsp_vulkan_write_descriptors(const lsp_vulkan_functions* functions,
 LSP_API void lsp_vulkan_address_table(const lsp_vulkan_plan* plan, const VkDeviceAddress* buffer_addresses,
                                       VkDeviceAddress table[LSP_VULKAN_ADDRESS_COUNT]);
 LSP_API void lsp_vulkan_write_address_table(const lsp_vulkan_functions* functions, VkDevice device,
-                                            VkDescriptorSet set, VkBuffer table);
+                                            VkDescriptorSet set, VkBuffer table); /* that holds it */
 
 /* Rays that one dispatch can trace on the device. */
 LSP_API uint32_t lsp_vulkan_max_rays(const lsp_vulkan_limits* limits);

@@ -51,9 +51,9 @@ class SceneFile {
     check(lsp_open(unpacked_.get(), raw, &scene_, &error));
   }
 
-  const lsp_scene& scene() const { return scene_; }
-  const LspHeader& header() const { return *scene_.header; }
-  bool unpacked() const { return unpacked_ != nullptr; }                          // the file was packed
+  const lsp_scene& scene() const { return scene_; }           // of this file, for as long as it lives
+  const LspHeader& header() const { return *scene_.header; }  // of the file
+  bool unpacked() const { return unpacked_ != nullptr; }      // the file was packed
   uint64_t bytes_mapped() const { return unpacked() ? 0 : mapping_.value.size; }  // 0 after unpacking
 
  private:

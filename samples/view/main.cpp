@@ -1,0 +1,259 @@
+// lsp-view: flies through an .lsp file, exact light on the left of a line, approximate light on its right.
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#define GLFW_INCLUDE_NONE
+#include "bake_first.h"
+#include "controls.h"
+#include "lsp/command_line.h"
+#include "lsp/trace_arguments.hpp"
+#include "output_file.h"
+#include "picture.h"
+
+#include <GLFW/glfw3.h>
+
+namespace lsp::sample {
+namespace {
+
+constexpr const char* kProgram = "lsp-view";
+const std::vector<std::string> kEffects{"light", "diffuse", "ao", "heat"};  // by VIEW_LIGHT and so on
+
+struct Arguments {
+  std::string file;
+  std::string effect = "light";
+  TraceArguments trace;
+  std::string camera;
+  std::string size = "960x540";
+  std::string screenshot;
+  uint32_t frames = 0;  // 0: until the window is closed
+  bool validation = false;
+  ViewState state;
+};
+
+// GLFW, and a window of it.
+class Window {
+ public:
+  explicit Window(glm::ivec2 size) {
+    if (glfwInit() != GLFW_TRUE) {
+      throw Failure(Exit::kUnsupported, "",
+                    "there is no display to open a window on; run it from a desktop, under xvfb-run, or use "
+                    "lsp-render");
+    }
+    glfwWindowHint(GLFW_CLIENT_API, GLFW_NO_API);
+    window_ = glfwCreateWindow(size.x, size.y, kProgram, nullptr, nullptr);
+    if (window_ == nullptr) {
+      glfwTerminate();
+      throw Failure(Exit::kUnsupported, "",
+                    "the display opens no window of " + std::to_string(size.x) + "x" +
+                        std::to_string(size.y) + "; choose another --size");
+    }
+  }
+  ~Window() {
+    glfwDestroyWindow(window_);
+    glfwTerminate();
+  }
+  Window(const Window&) = delete;
+  Window& operator=(const Window&) = delete;
+  GLFWwindow* handle() const { return window_; }
+
+ private:
+  GLFWwindow* window_ = nullptr;
+};
+
+std::string dial_name(const lsp_trace_options& options, const LspHeader& header) {
+  char text[64] = "approximate";
+  if ((header.required_features & LSP_FEATURE_CELLS) == 0) {
+    if (options.lod > 0) std::snprintf(text, sizeof text, "lod %g", static_cast<double>(options.lod));
+  } else if ((options.flags & LSP_TRACE_MAX_LOSS) != 0) {
+    std::snprintf(text, sizeof text, "max loss %g %%", static_cast<double>(options.max_loss));
+  } else {
+    const char* const names[] = {"balanced", "fast", "accurate"};
+    return names[options.quality];
+  }
+  return text;
+}
+
+double milliseconds(const ViewReport& report, uint32_t part) {
+  return report.samples > 0 ? 1e3 * report.seconds[part] / report.samples : 0;
+}
+
+std::string figures(const ViewReport& report, const ViewState& state, const LspHeader& header) {
+  const double exact = report.mrays(VIEW_EXACT), approximate = report.mrays(VIEW_APPROXIMATE);
+  char text[256];
+  std::snprintf(text, sizeof text, "%s: exact %.1f ms, %.2f Mrays/s | %s %.1f ms, %.2f Mrays/s",
+                kEffects[state.effect].c_str(), milliseconds(report, VIEW_EXACT), exact,
+                dial_name(state.approximate, header).c_str(), milliseconds(report, VIEW_APPROXIMATE),
+                approximate);
+  std::string line = text;
+  if (exact > 0 && approximate > 0) {
+    std::snprintf(text, sizeof text, ", %.2fx", approximate / exact);
+    line += text;
+  }
+  std::snprintf(text, sizeof text, " | %u samples, %.0f ms each", report.samples, 1e3 * report.frame_seconds);
+  return line + text;
+}
+
+// Keeps the window up until it is closed or has shown so many frames.
+void show(Viewer& viewer, GLFWwindow* window, ViewState& state, const Arguments& arguments,
+          const LspHeader& header, float diagonal) {
+  Controls controls(window, state.camera, diagonal);
+  double titled = -1.0;
+  uint32_t shown = 0;
+  while (glfwWindowShouldClose(window) == GLFW_FALSE && (arguments.frames == 0 || shown < arguments.frames)) {
+    glfwPollEvents();
+    const bool moving = controls.apply(state);
+    const ViewState now = state;
+    const bool done = viewer.frame(now, moving, [&] {
+      glfwPollEvents();
+      controls.apply(state);
+      return !(state == now) || glfwWindowShouldClose(window) != GLFW_FALSE;
+    });
+    if (done) ++shown;
+    if (!done && glfwGetWindowAttrib(window, GLFW_ICONIFIED) != GLFW_FALSE) glfwWaitEventsTimeout(0.2);
+    if (glfwGetTime() - titled < 0.5 || !done) continue;
+    titled = glfwGetTime();
+    glfwSetWindowTitle(
+        window, ("lsp-view " + arguments.file + " | " + figures(viewer.report(), state, header)).c_str());
+  }
+}
+
+void report(const ViewReport& r, const ViewState& state, const Arguments& arguments,
+            const CommonOptions& common, const Gpu& gpu, const LspHeader& header) {
+  const auto half = [&](uint32_t part) {
+    return nlohmann::ordered_json{{"rays", r.rays[part]},
+                                  {"seconds", r.seconds[part]},
+                                  {"milliseconds_per_sample", milliseconds(r, part)},
+                                  {"mrays_per_second", r.mrays(part)},
+                                  {"steps", r.steps[part]}};
+  };
+  if (common.json) {
+    std::cout << nlohmann::ordered_json{{"file", arguments.file},
+                                        {"device", gpu.properties.deviceName},
+                                        {"effect", kEffects[state.effect]},
+                                        {"split", state.split},
+                                        {"dial", dial_name(state.approximate, header)},
+                                        {"camera", to_string(state.camera)},
+                                        {"samples", r.samples},
+                                        {"exact", half(VIEW_EXACT)},
+                                        {"approximate", half(VIEW_APPROXIMATE)},
+                                        {"incomplete", r.incomplete},
+                                        {"screenshot", arguments.screenshot},
+                                        {"validation_messages", gpu.messages}}
+                     .dump(2)
+              << "\n";
+  } else if (!common.quiet) {
+    std::printf("%s, %s\n%s\ncamera %s\n", arguments.file.c_str(), gpu.properties.deviceName,
+                figures(r, state, header).c_str(), to_string(state.camera).c_str());
+  }
+}
+
+void say(const CommonOptions& common, const std::string& file, const std::vector<std::string>& notes) {
+  if (common.quiet) return;
+  for (const std::string& note : notes) std::cerr << kProgram << ": " << file << ": " << note << "\n";
+}
+
+void run(Arguments& arguments, const CommonOptions& common) {
+  const std::filesystem::path ending = std::filesystem::path(arguments.file).extension();
+  if (ending == ".json")
+    throw Failure(Exit::kUnsupported, arguments.file,
+                  "is a scene of instances, which lsp-render shows; bake one .lsp file");
+  if (!arguments.screenshot.empty() && std::filesystem::path(arguments.screenshot).extension() != ".png")
+    throw Failure(Exit::kUsage, arguments.screenshot, "screenshots are written as .png; choose such a name");
+  if (!arguments.screenshot.empty() && arguments.frames == 0)
+    throw Failure(Exit::kUsage, "", "--screenshot needs --frames, how many to render before it is taken");
+  const glm::ivec2 size = parse_size(arguments.size);
+  ViewState& state = arguments.state;
+  state.approximate = to_trace_options(arguments.trace, true);
+  state.effect = static_cast<uint32_t>(std::ranges::find(kEffects, arguments.effect) - kEffects.begin());
+  std::optional<Camera> camera;
+  if (!arguments.camera.empty()) camera = parse_camera(arguments.camera);
+
+  std::optional<BakedFile> baked;
+  if (ending != ".lsp") {
+    say(common, arguments.file,
+        {"is baked first; to keep that: lsp-bake " + arguments.file + " -o scene.lsp"});
+    baked.emplace(arguments.file, common.quiet);
+  }
+  const RenderScene scene(baked ? baked->path() : std::filesystem::path(arguments.file));
+  baked.reset();  // a mapping needs no name
+  const LspHeader& header = *scene.headers().front();
+  say(common, arguments.file, scene.notes());
+  say(common, arguments.file, unused_arguments(arguments.trace, true, header));
+  if ((header.required_features & (LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS)) == 0)
+    say(common, arguments.file, {"neither Line Spaces nor cells in the file: both halves are exact"});
+  Sky sky;
+  Lamp lamp;
+  state.camera = default_camera(scene, *make_cpu_tracer(scene, 0), lamp);
+  if (suit(sky, lamp, scene))
+    say(common, arguments.file, {"a hall without lights: a lamp hangs in its middle"});
+  if (camera) state.camera = *camera;
+
+  const Window window(size);
+  Gpu gpu(window.handle(), arguments.validation);
+  ViewReport shown;
+  {
+    Viewer viewer(gpu, window.handle(), scene, sky);
+    show(viewer, window.handle(), state, arguments, header, scene.diagonal());
+    shown = viewer.report();
+    if (!arguments.screenshot.empty()) {
+      const Viewer::Screenshot shot = viewer.screenshot();
+      write_file(arguments.screenshot, rgba_png(shot.width, shot.height, shot.rgba));
+    }
+  }
+  report(shown, state, arguments, common, gpu, header);
+  if (shown.incomplete > 0)
+    say(common, arguments.file,
+        {std::to_string(shown.incomplete) + " rays were cut short by the device and are dark"});
+  if (!gpu.messages.empty())
+    throw Failure(Exit::kInternal, "", "the validation layer says: " + gpu.messages.front());
+}
+
+}  // namespace
+}  // namespace lsp::sample
+
+int main(int argc, char** argv) {
+  using namespace lsp;
+  using namespace lsp::sample;
+  CLI::App app(
+      std::string("Shows an .lsp file in a window to fly through: left of a line indirect light is exact, "
+                  "right of it approximate.\n") +
+          kControlsHelp,
+      kProgram);
+  CommonOptions common;
+  Arguments a;
+  add_common_options(app, kProgram, common);
+  app.add_option("FILE", a.file, "The baked scene, an .lsp file; or a mesh, which is baked first")
+      ->required();
+  app.add_option(
+         "--effect", a.effect,
+         "What is shown: light (all of it, with one diffuse bounce), diffuse (the bounce alone), ao, or heat "
+         "(steps of the bounce's rays: black, red, yellow, from 128 on white) (default light)")
+      ->check(CLI::IsMember(kEffects));
+  app.add_option("--split", a.state.split,
+                 "Where the line is, a share of the width: 0 all approximate, 1 all exact (default 0.5)")
+      ->check(CLI::Range(0.0f, 1.0f));
+  add_trace_arguments(app, a.trace);
+  app.add_option("--camera", a.camera,
+                 "X,Y,Z:X,Y,Z:FOV, the vertical angle in degrees (default: from the scene)");
+  app.add_option("--size", a.size, "Of the window, in pixels (default 960x540)");
+  app.add_option("--radius", a.state.ao_distance,
+                 "Reach of --effect ao in diagonals of the scene (default 0.1)")
+      ->check(CLI::Range(1e-6f, 1e6f));
+  app.add_option("--exposure", a.state.exposure, "Stops to brighten the picture by (default 0)")
+      ->check(CLI::Range(-20.0f, 20.0f));
+  app.add_option("--frames", a.frames, "Show so many and end (default: until the window is closed)")
+      ->check(CLI::Range(1u, 1u << 20));
+  app.add_option("--screenshot", a.screenshot, "Write what the window shows after --frames, as .png");
+  app.add_flag("--validation", a.validation,
+               "Switch Vulkan's validation layer on; what it says is exit code 4");
+  arrange_help(
+      app, "lsp-view room.lsp --quality fast",
+      {{"What most people need", {"FILE", "--effect", "--split SHARE", "--quality", "--max-loss PERCENT"}},
+       {"The picture", {"--camera EYE:TARGET:ANGLE", "--size WxH", "--exposure STOPS", "--radius"}},
+       {"Line Spaces", {"--near", "--lod"}},
+       {"Without hands", {"--frames", "--screenshot FILE.png", "--validation"}}});
+  return run_program(kProgram, app, argc, argv, [&] { run(a, common); });
+}

@@ -1,0 +1,14 @@
+// The SPIR-V of shaders/, compiled once for each structure (LSP_BASE_*) that a file may have.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+namespace lsp::sample {
+
+std::span<const uint32_t> eye_code(uint32_t base_structure);
+std::span<const uint32_t> gather_code(uint32_t base_structure);
+std::span<const uint32_t> light_code(uint32_t base_structure);
+std::span<const uint32_t> show_code();
+
+}  // namespace lsp::sample

@@ -1,0 +1,117 @@
+/* What the shaders of paths share: their buffers, random numbers, and what a surface is. */
+#include "lsp/lsp.glsl"
+#include "sampler.glsl"
+
+layout(local_size_x = VIEW_GROUP_EDGE, local_size_y = VIEW_GROUP_EDGE) in;
+layout(constant_id = VIEW_CONSTANT_FLAGS) const uint kFlags = 0u;
+layout(push_constant) uniform Constants { ViewRegion region; };
+
+layout(std430, set = 1, binding = VIEW_BINDING_FRAME) readonly buffer FrameBuffer { ViewFrame frame; };
+layout(std430, set = 1, binding = VIEW_BINDING_SUMS) buffer SumBuffer { vec4 sums[]; };
+layout(std430, set = 1, binding = VIEW_BINDING_VERTICES) buffer VertexBuffer { ViewVertex vertices[]; };
+layout(std430, set = 1, binding = VIEW_BINDING_MATERIALS) readonly buffer MaterialBuffer { LspMaterial materials[]; };
+layout(std430, set = 1, binding = VIEW_BINDING_TRIANGLES) readonly buffer TriangleBuffer { uint triangle_of[]; };
+layout(std430, set = 1, binding = VIEW_BINDING_STATISTICS) buffer StatisticsBuffer { ViewStatistics statistics[2]; };
+
+struct Pixel {
+  uvec2 at;
+  uint number; /* in the picture */
+  uint item;   /* in the slice */
+};
+
+/* False: this invocation lies outside the region. */
+bool find_pixel(out Pixel pixel) {
+  if (gl_GlobalInvocationID.x >= region.columns || gl_GlobalInvocationID.y >= region.rows) return false;
+  pixel.at = uvec2(region.first_column, region.first_row) + gl_GlobalInvocationID.xy;
+  pixel.number = pixel.at.y * frame.width + pixel.at.x;
+  pixel.item = gl_GlobalInvocationID.y * frame.width + pixel.at.x;
+  return true;
+}
+
+/* Pairs of random numbers of a pixel's sample, by purpose: those of lsp-render's renderer.cpp. */
+const uint kPixelPoint = 0u;
+const uint kOcclusionDirection = 2u;
+const uint kDirectLight = 3u;
+const uint kDiffuseDirection = 7u;
+const uint kBounceLight = 8u;
+const uint kEmitterChoice = 64u; /* and one more of the bounce */
+
+vec2 random(Pixel pixel, uint purpose) {
+  return sobol_point(frame.sample_number, hash_combine(hash_mix(pixel.number + 0x68BC21EBu), purpose));
+}
+
+/* A bright sample is cut: it would stay as a white dot. */
+void add(Pixel pixel, vec3 radiance) {
+  float largest = max(max(radiance.x, radiance.y), radiance.z);
+  if (!(largest > 0.0) || isinf(largest)) return;
+  sums[pixel.number].xyz += largest > 20.0 ? radiance * (20.0 / largest) : radiance;
+}
+
+/* Unit vectors that make a right-handed frame with unit n (Duff et al. 2017). */
+void make_frame(vec3 n, out vec3 tangent, out vec3 bitangent) {
+  float s = n.z < 0.0 ? -1.0 : 1.0;
+  float a = -1.0 / (s + n.z);
+  float b = n.x * n.y * a;
+  tangent = vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x);
+  bitangent = vec3(b, s + n.y * n.y * a, -n.y);
+}
+
+const float kTau = 6.28318530717958648;
+
+vec3 cosine_direction(vec3 n, vec2 u) {
+  vec3 t, b;
+  make_frame(n, t, b);
+  float r = sqrt(u.x);
+  return normalize(r * cos(kTau * u.y) * t + r * sin(kTau * u.y) * b + sqrt(max(1.0 - u.x, 0.0)) * n);
+}
+
+/* A direction that the shading normal allows but that runs into the surface is mirrored out of it. */
+vec3 above(ViewVertex v, vec3 direction) {
+  float depth = dot(direction, v.geometric_normal);
+  return depth < 0.0 ? direction - 2.0 * depth * v.geometric_normal : direction;
+}
+
+vec3 sky_radiance(vec3 direction) {
+  float haze = pow(1.0 - max(direction.y, 0.0), 3.0);
+  vec3 clear = mix(vec3(0.28, 0.52, 1.0), vec3(0.86, 0.92, 1.0), haze) * 2.2;
+  float toward = max(dot(direction, frame.sun_direction), 0.0);
+  vec3 glow = vec3(1.0, 0.85, 0.6) * (0.9 * pow(toward, 24.0));
+  return frame.sky_brightness * mix(vec3(0.24, 0.22, 0.20), clear + glow, clamp(direction.y * 12.0 + 0.5, 0.0, 1.0));
+}
+
+struct Surface {
+  ViewVertex vertex; /* its weight is the surface's colour */
+  vec3 emission;
+};
+
+/* The surface that a ray has hit. */
+Surface surface_of(LspRay ray, LspHit hit) {
+  LspScene scene = lsp_bound_scene();
+  Surface s;
+  vec3 position = ray.origin + hit.t * ray.direction;
+  vec3 shading = hit.normal;
+  vec3 geometric = hit.normal;
+  uint index = hit.primitive < triangle_of.length() ? triangle_of[hit.primitive] : LSP_NONE;
+  uint material = 0u;
+  if (index != LSP_NONE) {
+    LspTriangle tri = lsp_load_triangle(scene, index);
+    vec3 e1 = tri.v1 - tri.v0, e2 = tri.v2 - tri.v0;
+    vec3 area = cross(e1, e2);
+    float twice = length(area);
+    if (twice > 0.0) geometric = area / twice;
+    /* Closer to the triangle than the way along the ray. A table's plane is another: there t counts. */
+    if ((hit.flags & LSP_HIT_LINE_SPACE) == 0u) position = tri.v0 + hit.u * e1 + hit.v * e2;
+    material = tri.material;
+  }
+  if (dot(geometric, ray.direction) > 0.0) geometric = -geometric;
+  if (dot(geometric, shading) < 0.0) shading = -shading;
+  s.vertex.origin = position + lsp_hit_offset(scene, hit) * geometric;
+  s.vertex.alive = 1u;
+  s.vertex.geometric_normal = geometric;
+  s.vertex.shading_normal = shading;
+  LspMaterial m = materials[material < materials.length() ? material : 0u];
+  s.vertex.weight = clamp(m.base_color, 0.0, 1.0); /* metals, too, are seen as diffuse */
+  s.emission = m.emission;
+  s.vertex.reserved0 = s.vertex.reserved1 = s.vertex.reserved2 = 0u;
+  return s;
+}

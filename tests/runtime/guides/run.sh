@@ -1,0 +1,42 @@
+#!/usr/bin/env bash
+# run.sh SOURCE_DIR BIN_DIR WORK_DIR GUIDE_CPU
+#
+# The commands of the guides, in their order, each guide's in a folder of its own; GUIDE_CPU is INTEGRATION.md's program. And
+# every figure of TUNING.md is one of RESULTS.md.
+set -euo pipefail
+source=$1 bin=$2 work=$3 program=$4
+extract=$source/tests/runtime/guides/extract.awk
+rm -rf "$work"
+mkdir -p "$work/integration/include/lsp" "$work/tuning"
+export PATH="$bin:$PATH"
+blocks() { awk -v want="$2" -f "$extract" "$source/runtime/$1.md"; }
+run() { # run GUIDE INFO: the blocks, or what is wrong with them
+  local commands
+  commands=$(blocks "$1" "$2")
+  [ -n "$commands" ] || { echo "$1.md has no commands in blocks '$2'"; exit 1; }
+  bash -euo pipefail -x -c "$commands" || { echo "$1.md: a command failed"; exit 1; }
+}
+
+cd "$work/integration"
+cp "$source"/runtime/include/lsp/* "$source"/format-spec/include/lsp/* include/lsp/
+blocks INTEGRATION glsl >ao.comp
+run INTEGRATION sh
+if command -v spirv-cross >/dev/null; then run INTEGRATION "sh spirv-cross"; else echo "without spirv-cross"; fi
+"$program" room.lsp | tee said
+grep -q '^256 rays went on, [1-9]' said && grep -q '^hits: [1-9]' said || { echo "INTEGRATION.md: its program meets nothing"; exit 1; }
+
+cd "$work/tuning"
+run TUNING sh
+
+figures=$(grep -oE '[0-9][0-9.,]*(x| %| MB| s\b)' "$source/runtime/TUNING.md" | sort -u)
+[ "$(wc -l <<<"$figures")" -ge 30 ] || { echo "TUNING.md has hardly a figure"; exit 1; }
+missing=0
+while IFS= read -r figure; do
+  # In a table or a list of RESULTS.md the unit may stand once for several.
+  number=${figure%%[x ]*}
+  if ! grep -qF "$figure" "$source/tests/bench/RESULTS.md" && ! grep -qE "(^|[^0-9.])${number//./\\.}([ ,x;%]|$)" "$source/tests/bench/RESULTS.md"; then
+    echo "TUNING.md: $figure is not in RESULTS.md"
+    missing=1
+  fi
+done <<<"$figures"
+exit $missing

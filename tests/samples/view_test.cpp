@@ -1,0 +1,367 @@
+// lsp-view and its parts, on a display of their own (Xvfb). Skips where there is no Xvfb or no Vulkan device.
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#define GLFW_INCLUDE_NONE
+#include <algorithm>
+#include <cstdlib>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "bake_first.h"
+#include "controls.h"
+#include "lsp/vulkan_device.hpp"
+#include "viewer.h"
+
+#define STB_IMAGE_IMPLEMENTATION
+#define STB_IMAGE_STATIC
+#define STBI_ONLY_PNG
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wunused-function"
+#pragma GCC diagnostic ignored "-Wsign-compare"
+#include <stb/stb_image.h>
+#pragma GCC diagnostic pop
+
+#include <GLFW/glfw3.h>
+
+// Drivers and window libraries leave memory behind at the end.
+extern "C" const char* __lsan_default_options() { return "detect_leaks=0"; }
+
+namespace lsp::sample {
+namespace {
+
+constexpr int kWidth = 160, kHeight = 90;
+
+// An X server without a screen, for as long as it lives.
+class Xvfb {
+ public:
+  Xvfb() {
+    int numbers[2];
+    if (pipe(numbers) != 0) return;
+    server_ = fork();
+    if (server_ == 0) {
+      close(numbers[0]);
+      const std::string descriptor = std::to_string(numbers[1]);
+      if (freopen("/dev/null", "w", stderr) == nullptr) _exit(127);
+      execlp("Xvfb", "Xvfb", "-displayfd", descriptor.c_str(), "-screen", "0", "800x600x24", "-nolisten",
+             "tcp", nullptr);
+      _exit(127);
+    }
+    close(numbers[1]);
+    // It answers once it is ready; hung up before the end of the line it would die.
+    std::string number;
+    for (char c = 0; ::read(numbers[0], &c, 1) == 1 && c != '\n';) number += c;
+    close(numbers[0]);
+    if (!number.empty()) display_ = std::string(":").append(number);
+  }
+  ~Xvfb() {
+    if (server_ <= 0) return;
+    kill(server_, SIGTERM);
+    waitpid(server_, nullptr, 0);
+  }
+  Xvfb(const Xvfb&) = delete;
+  Xvfb& operator=(const Xvfb&) = delete;
+  const std::string& display() const { return display_; }  // empty: there is none
+
+ private:
+  pid_t server_ = -1;
+  std::string display_;
+};
+
+int run(const std::string& command) {
+  const int status = std::system((std::string(LSP_BIN_DIR) + "/" + command).c_str());
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+std::string read(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream bytes;
+  bytes << file.rdbuf();
+  return bytes.str();
+}
+
+using Shot = Viewer::Screenshot;
+
+Shot read_png(const std::string& path) {
+  Shot shot;
+  int channels = 0;
+  stbi_uc* bytes = stbi_load(path.c_str(), &shot.width, &shot.height, &channels, 4);
+  if (bytes != nullptr) shot.rgba.assign(bytes, bytes + size_t{4} * shot.width * shot.height);
+  stbi_image_free(bytes);
+  return shot;
+}
+
+// Mean and largest difference of the bytes of columns [first, last).
+struct Difference {
+  double mean = 0;
+  int most = 0;
+};
+Difference difference(const Shot& a, const Shot& b, int first, int last) {
+  EXPECT_EQ(a.rgba.size(), b.rgba.size());
+  Difference result;
+  for (int y = 0; y < a.height; ++y) {
+    for (int i = 4 * (y * a.width + first); i < 4 * (y * a.width + last); ++i) {
+      const int off = std::abs(int{a.rgba[i]} - int{b.rgba[i]});
+      result.mean += off;
+      result.most = std::max(result.most, off);
+    }
+  }
+  result.mean /= 3.0 * a.height * std::max(last - first, 1);
+  return result;
+}
+
+class View : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    server_ = std::make_unique<Xvfb>();
+    if (server_->display().empty()) return;
+    setenv("DISPLAY", server_->display().c_str(), 1);
+    unsetenv("WAYLAND_DISPLAY");
+    folder_ = std::filesystem::temp_directory_path() / ("lsp_view_" + std::to_string(::getpid()));
+    std::filesystem::create_directories(folder_);
+    std::ofstream(file("corner.obj")) << "v 0 0 0\nv 4 0 0\nv 4 0 4\nv 0 0 4\nv 0 3 0\nv 4 3 0\nv 0 3 4\n"
+                                         "f 4 3 2 1\nf 1 2 6 5\nf 1 5 7 4\n";
+    const std::string mesh = file("s.glb");
+    ASSERT_EQ(run("lsp-sample-scene " + mesh + " --quiet --triangles 8000 --scene spheres"), 0);
+    ASSERT_EQ(run("lsp-bake " + mesh + " -o " + file("cells.lsp") +
+                  " --quiet --base cells --cells 12 --preset fast"),
+              0);
+    ASSERT_EQ(
+        run("lsp-bake " + mesh + " -o " + file("bvh.lsp") + " --quiet --base bvh --resolution 4 --depth 3,6"),
+        0);
+    ASSERT_EQ(run("lsp-bake " + mesh + " -o " + file("ntree.lsp") + " --quiet --base ntree"), 0);
+    ASSERT_EQ(run("lsp-bake " + mesh + " -o " + file("wide.lsp") + " --quiet --base wide"), 0);
+  }
+  static void TearDownTestSuite() {
+    if (!folder_.empty()) std::filesystem::remove_all(folder_);
+    server_.reset();
+  }
+  void SetUp() override {
+    if (server_->display().empty()) GTEST_SKIP() << "no Xvfb (Debian: xvfb)";
+    std::string why;
+    if (!VulkanTracer::available(&why)) GTEST_SKIP() << why;
+  }
+
+  static std::string file(const std::string& name) { return (folder_ / name).string(); }
+
+  // Runs lsp-view in a small window near the spheres; its report is in report_.
+  int view(const std::string& arguments) {
+    const int exit = run("lsp-view --json --size 160x90 --camera 9,7,14:0,1,0:40 " + arguments + " > " +
+                         file("report.json"));
+    report_ = exit == 0 ? nlohmann::json::parse(read(file("report.json"))) : nlohmann::json{};
+    return exit;
+  }
+  Shot shot(const std::string& scene, const std::string& arguments) {
+    EXPECT_EQ(view(file(scene) + " --quiet --frames 4 --screenshot " + file("shot.png") + " " + arguments), 0)
+        << arguments;
+    return read_png(file("shot.png"));
+  }
+
+  nlohmann::json report_;
+  static std::unique_ptr<Xvfb> server_;
+  static std::filesystem::path folder_;
+};
+
+std::unique_ptr<Xvfb> View::server_;
+std::filesystem::path View::folder_;
+
+double mean(const Shot& shot) {
+  double sum = 0;
+  for (const uint8_t byte : shot.rgba) sum += byte;
+  return (sum / static_cast<double>(shot.rgba.size()) * 4 - 255) / 3;
+}
+
+// Of every structure and effect: the left half is the exact picture, the right half the approximate one.
+TEST_F(View, HalvesAreTheWholePictures) {
+  for (const std::string scene : {"cells.lsp", "bvh.lsp", "ntree.lsp", "wide.lsp"}) {
+    for (const std::string effect : {"light", "diffuse", "ao", "heat"}) {
+      if (scene != "cells.lsp" && effect != "light" && effect != "heat") continue;
+      SCOPED_TRACE(scene + " " + effect);
+      const std::string options = "--quality fast --near approximate --effect " + effect;
+      const Shot exact = shot(scene, options + " --split 1");
+      const Shot approximate = shot(scene, options + " --split 0");
+      const Shot both = shot(scene, options + " --split 0.5");
+      EXPECT_EQ(report_["samples"], 4);
+      EXPECT_EQ(report_["incomplete"], 0);
+      ASSERT_EQ(both.width, kWidth);
+      ASSERT_EQ(both.height, kHeight);
+      // Two columns beside the line on either side are its own.
+      EXPECT_EQ(difference(both, exact, 0, kWidth / 2 - 2).most, 0);
+      EXPECT_EQ(difference(both, approximate, kWidth / 2 + 2, kWidth).most, 0);
+      EXPECT_GT(mean(both), 4.0) << "it is black";
+      if (scene == "wide.lsp") {
+        EXPECT_EQ(difference(exact, approximate, 0, kWidth).most, 0) << "without tables both are exact";
+      } else {
+        EXPECT_GT(difference(exact, approximate, 0, kWidth).mean, 0.0) << "both halves are traced alike";
+        if (effect == "heat")
+          EXPECT_LT(mean(approximate), mean(exact)) << "tables take fewer steps";
+        else
+          EXPECT_LT(difference(exact, approximate, 0, kWidth).mean, 12.0);
+      }
+    }
+  }
+}
+
+// lsp-render is the reference: the same random numbers, on the CPU.
+TEST_F(View, AmbientOcclusionIsThatOfLspRender) {
+  const std::string options = "--effect ao --radius 0.2 ";
+  for (const std::string mode : {"exact", "approximate"}) {
+    const Shot seen = shot("cells.lsp", options + "--split " + (mode == "exact" ? "1" : "0"));
+    ASSERT_EQ(run("lsp-render " + file("cells.lsp") + " -o " + file("r.png") + " --quiet --samples 4 " +
+                  "--size 160x90 --camera 9,7,14:0,1,0:40 --mode " + mode + " " + options),
+              0);
+    const Difference off = difference(seen, read_png(file("r.png")), 0, kWidth);
+    EXPECT_LT(off.mean, 0.5)
+        << mode;  // sines and cosines differ in their last bits: a few rays hit another thing
+  }
+}
+
+// So is the bounce: its random numbers are the same, too, where nothing shines.
+TEST_F(View, BounceIsThatOfLspRender) {
+  ASSERT_EQ(run("lsp-bake " + file("corner.obj") + " -o " + file("corner.lsp") +
+                " --quiet --base bvh --resolution 4"),
+            0);
+  const std::string options = " --quiet --effect diffuse --size 160x90 ";
+  ASSERT_EQ(
+      run("lsp-view " + file("corner.lsp") + options + "--frames 4 --split 1 --screenshot " + file("v.png")),
+      0);
+  ASSERT_EQ(run("lsp-render " + file("corner.lsp") + " -o " + file("r.png") + options + "--samples 4"), 0);
+  const Shot seen = read_png(file("v.png"));
+  EXPECT_GT(mean(seen), 4.0) << "it is black";
+  EXPECT_LT(difference(seen, read_png(file("r.png")), 0, kWidth).mean, 0.5);
+}
+
+// The dial, lod and the line do what they say.
+TEST_F(View, OptionsReachTheShaders) {
+  const Shot fast = shot("cells.lsp", "--split 0 --quality fast");
+  EXPECT_EQ(report_["dial"], "fast");
+  const Shot tables = shot("cells.lsp", "--split 0 --max-loss 100");
+  EXPECT_EQ(report_["dial"], "max loss 100 %");
+  const Shot strict = shot("cells.lsp", "--split 0 --max-loss 0");
+  EXPECT_GT(difference(tables, strict, 0, kWidth).mean, difference(fast, strict, 0, kWidth).mean * 0.5);
+  EXPECT_GT(difference(tables, strict, 0, kWidth).mean, 0.0);
+  EXPECT_GT(difference(shot("bvh.lsp", "--split 0"), shot("bvh.lsp", "--split 0 --lod 1"), 0, kWidth).mean,
+            0.0);
+  EXPECT_GT(mean(shot("cells.lsp", "--exposure 1")), mean(shot("cells.lsp", "--exposure 0")));
+}
+
+// In one process: samples add up while nothing changes, the line and the window's size move, and the
+// validation layer has nothing to say.
+TEST_F(View, LivesThroughMovesAndResizing) {
+  const RenderScene scene(file("cells.lsp"));
+  ASSERT_EQ(glfwInit(), GLFW_TRUE);
+  glfwWindowHint(GLFW_CLIENT_API, GLFW_NO_API);
+  GLFWwindow* window = glfwCreateWindow(kWidth, kHeight, "test", nullptr, nullptr);
+  ASSERT_NE(window, nullptr);
+  {
+    std::unique_ptr<Gpu> gpu;
+    try {
+      gpu = std::make_unique<Gpu>(window, true);
+    } catch (const Failure& failure) {
+      gpu = std::make_unique<Gpu>(window, false);
+      std::printf("without validation: %s\n", failure.what());
+    }
+    Viewer viewer(*gpu, window, scene, Sky{});
+    ViewState state;
+    state.camera = parse_camera("9,7,14:0,1,0:40");
+    const auto show = [&](bool moving) {
+      bool shown = false;
+      for (int i = 0; i < 10 && !shown; ++i) {
+        glfwPollEvents();
+        shown = viewer.frame(state, moving);
+      }
+      EXPECT_TRUE(shown);
+    };
+    for (int i = 0; i < 3; ++i) show(false);
+    EXPECT_EQ(viewer.report().samples, 3u);
+    const Shot before = viewer.screenshot();
+
+    state.split = 0.25f;
+    show(true);
+    EXPECT_EQ(viewer.report().samples, 1u) << "a moved line begins anew";
+    do {
+      show(false);
+    } while (viewer.report().samples < 3);
+    EXPECT_EQ(viewer.report().scale, 1u) << "at rest every pixel is traced";
+    const Shot moved = viewer.screenshot();
+    EXPECT_EQ(difference(before, moved, 0, kWidth / 4 - 2).most, 0);
+    EXPECT_EQ(difference(before, moved, kWidth / 2 + 2, kWidth).most, 0);
+    EXPECT_EQ(moved.rgba[4 * (kWidth / 4)], 255) << "the line";
+
+    glfwSetWindowSize(window, 222, 131);
+    for (int i = 0; i < 20; ++i) {
+      glfwWaitEventsTimeout(0.02);
+      viewer.frame(state, false);
+    }
+    show(false);
+    const Shot larger = viewer.screenshot();
+    EXPECT_EQ(larger.width, 222);
+    EXPECT_EQ(larger.height, 131);
+    EXPECT_NEAR(mean(larger), mean(moved), 12.0);
+
+    EXPECT_FALSE(viewer.frame(state, false, [] { return true; }) && viewer.report().samples == 0)
+        << "a sample that was interrupted is not shown";
+    EXPECT_EQ(gpu->messages, std::vector<std::string>{});
+  }
+  glfwDestroyWindow(window);
+  glfwTerminate();
+}
+
+TEST_F(View, MeshesAreBakedFirst) {
+  ASSERT_EQ(view(file("corner.obj") + " --quiet --frames 1 --screenshot " + file("m.png")), 0);
+  EXPECT_GT(mean(read_png(file("m.png"))), 4.0);
+  std::filesystem::path left;
+  {
+    const BakedFile baked(file("corner.obj"), true);
+    left = baked.path();
+    EXPECT_TRUE(std::filesystem::exists(left));
+  }
+  EXPECT_FALSE(std::filesystem::exists(left.parent_path()));
+  std::ofstream(file("bad.obj")) << "f 1 2 3\n";
+  EXPECT_EQ(view(file("bad.obj") + " --quiet --frames 1 2>/dev/null"), 3);
+}
+
+TEST_F(View, ValidationHasNothingToSay) {
+  const int exit = view(file("cells.lsp") + " --quiet --frames 2 --validation 2> " + file("said"));
+  if (exit == 5 && read(file("said")).find("not installed") != std::string::npos)
+    GTEST_SKIP() << read(file("said"));
+  EXPECT_EQ(exit, 0) << read(file("said"));
+}
+
+TEST_F(View, ExitCodes) {
+  const std::string scene = file("cells.lsp"), none = " >/dev/null 2>&1";
+  EXPECT_EQ(run("lsp-view --help" + none), 0);
+  EXPECT_EQ(run("lsp-view --version" + none), 0);
+  EXPECT_EQ(run("lsp-view" + none), 1);
+  for (const std::string bad :
+       {"--split 2", "--effect gloss", "--frames 0", "--size 0x7", "--camera 1,2", "--max-loss -1",
+        "--radius 0", "--exposure 99", "--frames 1 --screenshot x.jpg", "--screenshot x.png"}) {
+    EXPECT_EQ(run("lsp-view " + scene + " " + bad + none), 1) << bad;
+  }
+  EXPECT_EQ(run("lsp-view " + file("missing.lsp") + " --frames 1" + none), 2);
+  EXPECT_EQ(run("lsp-view " + file("missing.obj") + " --frames 1" + none), 2);
+  EXPECT_EQ(run("lsp-view " + scene + " --size 8x8 --frames 1 --screenshot /nonexistent/x.png" + none), 2);
+  std::ofstream(file("text.lsp")) << "no scene";
+  EXPECT_EQ(run("lsp-view " + file("text.lsp") + " --frames 1" + none), 3);
+  std::ofstream(file("scene.json")) << "{}";
+  EXPECT_EQ(run("lsp-view " + file("scene.json") + " --frames 1" + none), 5);
+  const std::string display = getenv("DISPLAY");
+  setenv("DISPLAY", ":no", 1);
+  EXPECT_EQ(run("lsp-view " + scene + " --frames 1" + none), 5) << "there is no display";
+  setenv("DISPLAY", display.c_str(), 1);
+}
+
+TEST(ViewControls, MaxLossMovesInSteps) {
+  EXPECT_EQ(next_max_loss(5, true), 10);
+  EXPECT_EQ(next_max_loss(5, false), 2);
+  EXPECT_EQ(next_max_loss(3, true), 5);
+  EXPECT_EQ(next_max_loss(100, true), 100);
+  EXPECT_EQ(next_max_loss(0, false), 0);
+}
+
+}  // namespace
+}  // namespace lsp::sample
