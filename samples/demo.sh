@@ -37,13 +37,16 @@ bin=$PWD/$build/bin
 
 out=out/demo
 mkdir -p "$out"
+rm -f "$out"/{curve,fast,accurate,compare,difference}*
 view=()
+light=()
 if [ ${#meshes[@]} -eq 0 ]; then
   say "making the scene"
   "$bin/lsp-sample-scene" "$out/scene.glb"
   meshes=("$PWD/$out/scene.glb")
   title="the atrium"
-  view=(--camera=-7.9,1.5,-0.9:3,3.1,0.35:66 --exposure 0.3)
+  view=(--camera=-7.9,1.5,-0.9:3,3.1,0.35:66)
+  light=(--exposure 0.3)
 else
   title=$(basename "${meshes[0]}")
 fi
@@ -62,10 +65,19 @@ render() { # render NAME MODE BACKEND [OPTION...]
   local name=$1 mode=$2 device=$3
   shift 3
   "$bin/lsp-render" "$out/scene.lsp" -o "$out/$name.png" -o "$out/$name.pfm" --mode "$mode" --backend "$device" \
-    --size 576x324 --samples 4 --denoise "${view[@]}" "$@" --json >"$out/$name.json"
+    --size 576x324 --samples 4 --denoise "${view[@]}" "${light[@]}" "$@" --json >"$out/$name.json"
 }
 compare() { # compare NAME PICTURE REPORT: with exact.pfm
   "$bin/lsp-compare" "$out/exact.pfm" "$out/$1.pfm" -o "$out/$2.png" --factor 4 --json >"$out/$3.json"
+}
+point() { # point NAME [OPTION...]: of the dial's curve, a small picture of many samples that needs no denoising
+  local name=$1
+  shift
+  "$bin/lsp-render" "$out/scene.lsp" -o "$out/curve_$name.pfm" --backend "$backend" --size 96x54 --samples 24 \
+    "${view[@]}" "$@" --quiet --json >"$out/curve_$name.json"
+  if [ "$name" != exact ]; then
+    "$bin/lsp-compare" "$out/curve_exact.pfm" "$out/curve_$name.pfm" --json >"$out/curve_compare_$name.json"
+  fi
 }
 
 say "rendering indirect light, exact and approximate"
@@ -75,12 +87,20 @@ if ! render exact exact vulkan; then
   backend=cpu
   render exact exact cpu
 fi
-render approx approximate "$backend"
+# The other pictures are exposed as the exact one.
+light=(--exposure="$(sed -n 's/^ *"exposure": \(.*\),$/\1/p' "$out/exact.json")")
+render approx approximate "$backend" --quiet  # its notes are the exact one's
 compare approx difference compare
-for quality in fast accurate; do
-  render "$quality" approximate "$backend" --quality "$quality"
-  compare "$quality" "difference_$quality" "compare_$quality"
-done
+if grep -q '"cells": {' "$out/bake.json"; then
+  for quality in fast accurate; do
+    render "$quality" approximate "$backend" --quality "$quality" --quiet
+    compare "$quality" "difference_$quality" "compare_$quality"
+  done
+  say "the dial's curve"
+  point exact --mode exact
+  for quality in fast balanced accurate; do point "$quality" --mode approximate --quality "$quality"; done
+  for loss in 30 10 3 1; do point "$loss" --mode approximate --max-loss "$loss"; done
+fi
 
 say "result"
 "$bin/lsp-demo-report" "$out" -o "$out/report.html" --title "$title" --validate-seconds "$seconds"

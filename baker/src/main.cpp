@@ -159,9 +159,10 @@ int main(int argc, char** argv) {
   app.add_flag("--strict", a.strict, "Refuse, with exit 3, an input that leads to any note");
   app.add_option("--depfile", a.depfile,
                  "Write a rule for Make and Ninja: OUT.lsp (or NAME.json): every file that was read");
-  app.add_option(
-      "--shard", a.shard,
-      "Bake share I of K of the cells, and write it as a part that lsp-merge joins with the others");
+  app.add_option("--shard", a.shard,
+                 "Bake share I of K of the cells, I from 1, and write it to -o as a part; lsp-merge joins "
+                 "all K, from as "
+                 "many machines, into the file of one bake");
   app.add_flag("--no-splits", a.no_splits, "Build the tree without spatial splits");
   add_common_options(app, "lsp-bake", a.common);
   arrange_help(

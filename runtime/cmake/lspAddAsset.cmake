@@ -1,9 +1,10 @@
-# lsp_add_asset(TARGET OUT.lsp SOURCES MESH... [OPTIONS OPTION...])
+# lsp_add_asset(TARGET OUT.lsp|OUT.json SOURCES MESH... [OPTIONS OPTION...])
 #
-# Bakes the MESHes into OUT.lsp as a part of building TARGET, with lsp-bake's OPTIONs: again when a file changed that
+# Bakes the MESHes into OUT.lsp, or into a scene of instances OUT.json with its assets OUT.MESH.lsp beside it (lsp-bake
+# --instances), as a part of building TARGET, with lsp-bake's OPTIONs: again when a file changed that
 # the bake read (textures and .mtl files too), when the OPTIONs or lsp-bake changed, and at no other time. TARGET is
 # one of the project's, or a name that is not taken: then it becomes a target that holds assets alone and is built by
-# default. A relative OUT.lsp lies in CMAKE_CURRENT_BINARY_DIR, relative MESHes in CMAKE_CURRENT_SOURCE_DIR.
+# default. A relative OUT lies in CMAKE_CURRENT_BINARY_DIR, relative MESHes in CMAKE_CURRENT_SOURCE_DIR.
 #
 # Bakes with the target lsp::lsp-bake where the programs are installed with the package or built with the project
 # (LSP_PROGRAMS), else with the program that the variable LSP_BAKE names or that is found in PATH.
@@ -11,8 +12,8 @@ cmake_policy(VERSION 3.20)  # depfiles: relative to the folder that asks, for Ni
 
 function(lsp_add_asset target output)
   cmake_parse_arguments(PARSE_ARGV 2 ARG "" "" "SOURCES;OPTIONS")
-  if(NOT ARG_SOURCES OR ARG_UNPARSED_ARGUMENTS OR NOT output MATCHES "\\.lsp$")
-    message(FATAL_ERROR "use lsp_add_asset(TARGET OUT.lsp SOURCES MESH... [OPTIONS OPTION...])")
+  if(NOT ARG_SOURCES OR ARG_UNPARSED_ARGUMENTS OR NOT output MATCHES "\\.(lsp|json)$")
+    message(FATAL_ERROR "use lsp_add_asset(TARGET OUT.lsp|OUT.json SOURCES MESH... [OPTIONS OPTION...])")
   endif()
   set(bake lsp::lsp-bake)
   if(NOT TARGET ${bake})
@@ -32,9 +33,13 @@ function(lsp_add_asset target output)
   endforeach()
   cmake_path(GET output PARENT_PATH folder)
   file(MAKE_DIRECTORY ${folder})
+  set(instances)
+  if(output MATCHES "\\.json$")
+    set(instances --instances)
+  endif()
   file(RELATIVE_PATH name ${CMAKE_BINARY_DIR} ${output})
   add_custom_command(OUTPUT ${output}
-    COMMAND ${bake} ${sources} -o ${output} --depfile ${output}.d --quiet ${ARG_OPTIONS}
+    COMMAND ${bake} ${sources} -o ${output} ${instances} --depfile ${output}.d --quiet ${ARG_OPTIONS}
     DEPENDS ${bake} ${sources} DEPFILE ${output}.d
     COMMENT "Baking ${name}" VERBATIM COMMAND_EXPAND_LISTS)
 

@@ -1,5 +1,6 @@
 #include "page.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdarg>
 #include <cstdint>
@@ -31,10 +32,12 @@ std::string psnr(const nlohmann::json& compare) {
   return compare.at("psnr_db").is_null() ? "equal pictures" : format("%.1f dB", number(compare, "psnr_db"));
 }
 
-double speed_up(const Figures& f, const nlohmann::json& approximate) {
-  const double exact = number(f.exact, "indirect_mrays_per_second");
-  return exact > 0 ? number(approximate, "indirect_mrays_per_second") / exact : 0;
+double times(const nlohmann::json& exact, const nlohmann::json& approximate) {
+  const double base = number(exact, "indirect_mrays_per_second");
+  return base > 0 ? number(approximate, "indirect_mrays_per_second") / base : 0;
 }
+
+double speed_up(const Figures& f, const nlohmann::json& approximate) { return times(f.exact, approximate); }
 
 bool has_cells(const Figures& f) { return f.bake.contains("cells") && !f.bake.at("cells").is_null(); }
 
@@ -74,6 +77,86 @@ std::string list(const nlohmann::json& items) {
   return out.empty() ? "<li>nothing</li>\n" : out;
 }
 
+// A round step of a scale of at most ten of them.
+double scale_step(double top) {
+  const double power = std::pow(10.0, std::floor(std::log10(top)) - 1);
+  for (const double step : {1.0, 2.0, 5.0, 10.0}) {
+    if (top <= 10 * step * power) return step * power;
+  }
+  return 10 * power;
+}
+
+// Speed against error as a drawing; nothing without points.
+std::string curve(const Figures& f) {
+  if (f.curve.empty()) return "";
+  struct Point {
+    double error, speed;
+    std::string name;
+    bool quality;
+  };
+  std::vector<Point> points;
+  double widest = 0;
+  double fastest = 1;
+  for (const Figures::Quality& q : f.curve) {
+    const bool number_alone = q.name.find_first_not_of("0123456789.") == std::string::npos;
+    points.push_back({100 * number(q.compare, "relative_mean"), times(f.curve_exact, q.approximate), q.name,
+                      !number_alone});
+    widest = std::max(widest, points.back().error);
+    fastest = std::max(fastest, points.back().speed);
+  }
+  std::ranges::sort(points, {}, &Point::error);
+  const double step_x = scale_step(std::max(widest, 0.01));
+  const double step_y = scale_step(fastest);
+  constexpr double kLeft = 56, kRight = 640, kTop = 16, kBottom = 268;
+  const double room = 1.12;  // for the last point's name
+  const auto x = [&](double error) {
+    return kLeft + (kRight - kLeft) * error / (room * std::max(widest, step_x));
+  };
+  const auto y = [&](double speed) { return kBottom - (kBottom - kTop) * speed / (room * fastest); };
+
+  std::string svg =
+      "<figure class=\"curve\"><svg viewBox=\"0 0 720 310\" role=\"img\" aria-label=\"speed against error; "
+      "the figures are in the table below\">\n";
+  for (int i = 0; i * step_y <= room * fastest; ++i) {
+    svg += format(
+        "<path class=\"grid\" d=\"M%g %.1fH%g\"/><text class=\"tick\" x=\"%g\" y=\"%.1f\" "
+        "text-anchor=\"end\">%g</text>\n",
+        kLeft, y(i * step_y), kRight, kLeft - 8, y(i * step_y) + 4, i * step_y);
+  }
+  for (int i = 0; i * step_x <= room * widest; ++i) {
+    svg += format("<text class=\"tick\" x=\"%.1f\" y=\"%g\" text-anchor=\"middle\">%g %%</text>\n",
+                  x(i * step_x), kBottom + 18, i * step_x);
+  }
+  svg += format(
+      "<path class=\"exact\" d=\"M%g %.1fH%g\"/><text x=\"%g\" y=\"%.1f\">exact</text>\n<path "
+      "class=\"line\" d=\"",
+      kLeft, y(1), kRight, kRight + 6, y(1) + 4);
+  for (const Point& p : points)
+    svg += format("%s%.1f %.1f", &p == &points.front() ? "M" : "L", x(p.error), y(p.speed));
+  svg += "\"/>\n";
+  for (const Point& p : points) {
+    svg += format("<circle cx=\"%.1f\" cy=\"%.1f\" r=\"%d\"/><text%s x=\"%.1f\" y=\"%.1f\">%s</text>\n",
+                  x(p.error), y(p.speed), p.quality ? 5 : 3, p.quality ? " class=\"named\"" : "",
+                  x(p.error) + 8, y(p.speed) - 7, escape_html(p.name).c_str());
+  }
+  svg += format(
+      "<text class=\"tick\" x=\"%g\" y=\"304\" text-anchor=\"end\">mean error of the picture</text></svg>",
+      kRight);
+  svg += format(
+      "<figcaption>Rays a second, times exact, against the error, of a picture of %d x %d pixels, %d "
+      "samples, "
+      "not denoised. Numbers: <code>--max-loss</code>, per cent.</figcaption></figure>\n",
+      f.curve_exact.at("width").get<int>(), f.curve_exact.at("height").get<int>(),
+      f.curve_exact.at("samples").get<int>());
+  svg +=
+      "<table><thead><tr><th>setting</th><th>rays a second, times exact</th><th>mean "
+      "error</th></tr></thead>\n";
+  for (const Point& p : points)
+    svg += "<tr><th>" + escape_html(p.quality ? p.name : "--max-loss " + p.name) +
+           format("</th><td>%.2f</td><td>%.2f %%</td></tr>\n", p.speed, p.error);
+  return svg + "</table>\n";
+}
+
 // The qualities side by side; nothing where there is but one.
 std::string dial(const Figures& f) {
   if (f.others.empty() || !has_tables(f)) return "";
@@ -91,7 +174,7 @@ std::string dial(const Figures& f) {
   };
   add("balanced (shown)", f.approximate, f.compare);
   for (const Figures::Quality& other : f.others) add(other.name, other.approximate, other.compare);
-  return html + "</table>\n";
+  return html + "</table>\n" + curve(f);
 }
 
 constexpr const char* kStyle = R"(
@@ -101,6 +184,15 @@ main{max-width:1100px;margin:0 auto;padding:1.2rem}h1{font-size:1.5rem;margin:.4
 p{color:var(--dim);margin:.3rem 0 1rem;max-width:46rem}strong{color:var(--accent)}
 figure{margin:0;background:var(--card);border:1px solid var(--line);border-radius:8px;overflow:hidden}
 figcaption{padding:.4rem .7rem;color:var(--dim);font-size:.9rem}img{display:block;width:100%}
+.slide:focus-within{outline:2px solid var(--accent)}.slide .error{position:absolute;inset:0;visibility:hidden}
+.slide[data-show=exact] .over{clip-path:inset(0 0 0 100%)}.slide[data-show=approximate] .over{clip-path:none}
+.slide[data-show=error] .error{visibility:visible}.slide[data-show] .bar,.slide[data-show] b{visibility:hidden}
+.controls{display:flex;flex-wrap:wrap;gap:.6rem;align-items:center;margin:.6rem 0;color:var(--dim);font-size:.9rem}
+button{font:inherit;color:var(--ink);background:var(--card);border:1px solid var(--line);border-radius:6px;padding:.3rem .8rem;cursor:pointer;touch-action:none}
+button[aria-pressed=true]{border-color:var(--accent);color:var(--accent)}button:focus-visible{outline:2px solid var(--accent)}
+.curve svg{display:block;width:100%;max-width:720px;fill:var(--dim);font-size:12px}.curve .grid{stroke:var(--line)}
+.curve .exact{stroke:var(--dim);stroke-dasharray:4 4}.curve .line{fill:none;stroke:var(--accent);stroke-width:1.5}
+.curve circle{fill:var(--accent)}.curve .named{fill:var(--ink);font-weight:600}.curve+table{margin-top:.8rem}
 .trio{display:grid;gap:.8rem;grid-template-columns:repeat(auto-fit,minmax(280px,1fr))}
 .slide{position:relative;border-radius:8px;overflow:hidden;border:1px solid var(--line)}
 .slide .over{position:absolute;inset:0;clip-path:inset(0 0 0 var(--at,50%))}
@@ -116,7 +208,27 @@ ul{margin:.2rem 0;padding-left:1.2rem}
 
 constexpr const char* kScript = R"(
 const slide=document.querySelector('.slide');
-slide.querySelector('input').addEventListener('input',e=>slide.style.setProperty('--at',e.target.value+'%'));
+const blink=document.getElementById('blink'),map=document.getElementById('map'),now=document.getElementById('now');
+const words={exact:'exact',approximate:'approximate',error:'error map'};
+let held=false;
+const show=what=>{
+  if(what)slide.dataset.show=what;else delete slide.dataset.show;
+  map.setAttribute('aria-pressed',what==='error');
+  now.textContent=what?words[what]:'';
+};
+const hold=on=>{if(held!==on){held=on;show(on?'approximate':'exact');}};
+const toggle=()=>show(slide.dataset.show==='error'?'':'error');
+slide.querySelector('input').addEventListener('input',e=>{show('');slide.style.setProperty('--at',e.target.value+'%');});
+blink.addEventListener('pointerdown',()=>hold(true));
+for(const end of['pointerup','pointercancel','blur'])window.addEventListener(end,()=>hold(false));
+map.addEventListener('click',toggle);
+const holds=e=>e.key.toLowerCase()==='b'||(e.target===blink&&(e.key===' '||e.key==='Enter'));
+document.addEventListener('keydown',e=>{
+  if(e.ctrlKey||e.metaKey||e.altKey)return;
+  if(holds(e)){e.preventDefault();hold(true);}
+  else if(e.key.toLowerCase()==='e'&&!e.repeat)toggle();
+});
+document.addEventListener('keyup',e=>{if(holds(e)){e.preventDefault();hold(false);}});
 )";
 
 }  // namespace
@@ -163,6 +275,7 @@ std::string make_page(const Figures& f, const Pictures& pictures) {
   const auto source = [](const std::string& png) { return "data:image/png;base64," + base64(png); };
   const std::string exact = source(pictures.exact);
   const std::string approximate = source(pictures.approximate);
+  const std::string difference = source(pictures.difference);
   const double factor = number(f.compare, "factor");
   const nlohmann::json& triangles = f.bake.at("triangles");
   const nlohmann::json& seconds = f.bake.at("seconds");
@@ -176,14 +289,19 @@ std::string make_page(const Figures& f, const Pictures& pictures) {
   html +=
       "<div class=\"slide\"><img alt=\"exact\" src=\"" + exact +
       "\"><img class=\"over\" alt=\"approximate\" src=\"" + approximate +
+      "\"><img class=\"error\" alt=\"error map\" src=\"" + difference +
       "\"><span class=\"bar\"></span><b style=\"left:.5rem\">exact</b><b "
       "style=\"right:.5rem\">approximate</b>"
-      "<input type=\"range\" min=\"0\" max=\"100\" value=\"50\" aria-label=\"exact or approximate\"></div>\n";
+      "<input type=\"range\" min=\"0\" max=\"100\" value=\"50\" aria-label=\"exact or approximate\"></div>\n"
+      "<div class=\"controls\"><button id=\"blink\" type=\"button\">Hold to see approximate</button><button "
+      "id=\"map\" type=\"button\" aria-pressed=\"false\">Error map</button><span id=\"now\" "
+      "role=\"status\"></span>"
+      "<span>Drag, or arrow keys: the border. B, held: approximate, else exact. E: error map.</span></div>\n";
   html += "<h2>Side by side</h2><div class=\"trio\">\n<figure><img alt=\"\" src=\"" + exact +
           "\"><figcaption>exact</figcaption></figure>\n<figure><img alt=\"\" src=\"" + approximate +
-          "\"><figcaption>approximate</figcaption></figure>\n<figure><img alt=\"\" src=\"" +
-          source(pictures.difference) + "\"><figcaption>absolute difference of linear light, times " +
-          format("%g", factor) + "</figcaption></figure>\n</div>\n";
+          "\"><figcaption>approximate</figcaption></figure>\n<figure><img alt=\"\" src=\"" + difference +
+          "\"><figcaption>absolute difference of linear light, times " + format("%g", factor) +
+          "</figcaption></figure>\n</div>\n";
 
   html +=
       "<h2>Time and error</h2>\n<table><thead><tr><th></th><th>exact</th><th>approximate</th></tr></thead>\n";

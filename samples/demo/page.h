@@ -24,6 +24,9 @@ struct Figures {
     nlohmann::json compare;
   };
   std::vector<Quality> others;
+  // A smaller picture at many settings of the dial, and its exact one; null where there are none.
+  std::vector<Quality> curve;
+  nlohmann::json curve_exact;
 };
 
 // PNG files' bytes.

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <optional>
+#include <set>
 #include <vector>
 
 #include "lsp/program.h"
@@ -12,31 +14,202 @@ namespace lsp::sample {
 namespace {
 
 constexpr float kPi = 3.14159265358979324f;
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 // What is seen from `origin` along `directions`, exactly.
 std::vector<LspHit> look_around(RayTracer& tracer, glm::vec3 origin,
                                 const std::vector<glm::vec3>& directions) {
   std::vector<LspRay> rays;
   for (const glm::vec3& d : directions) {
-    rays.push_back({from_glm(origin), 0.0f, from_glm(d), std::numeric_limits<float>::infinity()});
+    rays.push_back({from_glm(origin), 0.0f, from_glm(d), kInfinity});
   }
   std::vector<LspHit> hits(rays.size());
   tracer.trace({0, 0.0f}, rays, hits);
   return hits;
 }
 
+// How much of a scene rays see.
+struct Seen {
+  size_t front = 0;  // rays that hit the front of a surface
+  size_t back = 0;
+  size_t primitives = 0;  // that were hit, each once
+};
+
+Seen look(const std::vector<glm::vec3>& directions, const std::vector<LspHit>& hits) {
+  Seen seen;
+  std::set<std::pair<uint32_t, uint32_t>> primitives;
+  for (size_t i = 0; i < hits.size(); ++i) {
+    if (!std::isfinite(hits[i].t)) continue;
+    ++(glm::dot(to_glm(hits[i].normal), directions[i]) < 0 ? seen.front : seen.back);
+    primitives.emplace(LSP_HIT_INSTANCE(hits[i]), hits[i].primitive);
+  }
+  seen.primitives = primitives.size();
+  return seen;
+}
+
+Seen look_through(const Camera& camera, float aspect, RayTracer& tracer) {
+  constexpr int kHeight = 32;
+  const int width = std::max(1, static_cast<int>(kHeight * std::min(aspect, 8.0f)));
+  std::vector<glm::vec3> directions;
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < width; ++x)
+      directions.push_back(to_glm(camera.ray(glm::vec2(x, y) + 0.5f, width, kHeight).direction));
+  }
+  return look(directions, look_around(tracer, camera.eye, directions));
+}
+
+// Looks along -`back` at all `points`, as near as shows them with a little room around.
+Camera fit(const std::vector<glm::vec3>& points, glm::vec3 back, glm::vec3 up, float aspect,
+           float fov_degrees) {
+  constexpr float kRoom = 1.08f;
+  const glm::vec3 right = glm::normalize(glm::cross(up, back));
+  const glm::mat3 view(right, glm::cross(back, right), back);
+  const float tan_y = std::tan(fov_degrees * kPi / 360.0f);
+  const glm::vec2 tangent(tan_y * aspect, tan_y);
+  // Each side of the picture is a plane that the points must lie behind: the eye is where the two planes of
+  // left and right meet, or, further back, those of top and bottom.
+  glm::vec2 high(-kInfinity);
+  glm::vec2 low(-kInfinity);
+  float nearest = -kInfinity;
+  float farthest = kInfinity;
+  for (const glm::vec3& point : points) {
+    const glm::vec3 p = point * view;
+    const glm::vec2 across(p.x, p.y);
+    high = glm::max(high, across / tangent + p.z);
+    low = glm::max(low, -across / tangent + p.z);
+    nearest = std::max(nearest, p.z);
+    farthest = std::min(farthest, p.z);
+  }
+  const glm::vec2 centre = 0.5f * (high - low) * tangent;
+  const glm::vec2 reach = 0.5f * (high + low);
+  const float distance = std::max({reach.x, reach.y, nearest});
+  const float middle = 0.5f * (nearest + farthest);
+  Camera camera;
+  camera.up = up;
+  camera.fov_degrees = fov_degrees;
+  camera.target = view * glm::vec3(centre, middle);
+  // One point alone has no size to stand off by.
+  const float away = distance > middle ? distance - middle : 1.0f;
+  camera.eye = camera.target + kRoom * away * back;
+  return camera;
+}
+
+Camera view_of_object(const RenderScene& scene, RayTracer& tracer, glm::vec3 up, float aspect) {
+  constexpr float kFovDegrees = 38.0f;
+  const glm::mat3 frame = axes(up);
+  std::vector<glm::vec3> points = scene.some_corners(1u << 16);
+  if (points.empty()) points = {scene.lo(), scene.hi()};
+  // What lies flat is seen from higher up.
+  const glm::vec3 size = glm::abs((scene.hi() - scene.lo()) * frame);
+  const float rise = size.y < 0.3f * std::min(size.x, size.z) ? 0.75f : 0.36f;
+  Camera best;
+  float best_score = -1.0f;
+  for (int i = 0; i < 8; ++i) {
+    const float azimuth = 0.54f + 0.25f * kPi * static_cast<float>(i);
+    const glm::vec3 back = frame * glm::normalize(glm::vec3(std::sin(azimuth), rise, std::cos(azimuth)));
+    const Camera camera = fit(points, back, up, aspect, kFovDegrees);
+    const Seen seen = look_through(camera, aspect, tracer);
+    // Fronts of surfaces and many of them: into an open box, not at its back.
+    float score = static_cast<float>(seen.front) + static_cast<float>(seen.primitives);
+    if (i == 0) score *= 1.3f;
+    if (score <= best_score) continue;
+    best_score = score;
+    best = camera;
+  }
+  return best;
+}
+
+// The share of the scene's box that can be seen from `origin`, if it reaches everywhere as far as in 256
+// directions.
+float visible_share(const RenderScene& scene, RayTracer& tracer, glm::vec3 origin) {
+  constexpr int kDirections = 256;
+  std::vector<glm::vec3> directions;  // on a spiral that covers the sphere evenly
+  for (int i = 0; i < kDirections; ++i) {
+    const float z = 1.0f - 2.0f * (static_cast<float>(i) + 0.5f) / kDirections;
+    const float angle = 2.39996323f * (static_cast<float>(i) + 0.5f);
+    const float r = std::sqrt(1.0f - z * z);
+    directions.emplace_back(r * std::cos(angle), r * std::sin(angle), z);
+  }
+  const std::vector<LspHit> hits = look_around(tracer, origin, directions);
+  const glm::vec3 size = scene.hi() - scene.lo();
+  float volume = 0.0f;
+  for (size_t i = 0; i < hits.size(); ++i) {
+    // No further than to the side of the box.
+    const glm::vec3 d = directions[i];
+    const glm::vec3 sides =
+        (glm::mix(scene.lo(), scene.hi(), glm::greaterThan(d, glm::vec3(0))) - origin) / d;
+    const float t = std::min({hits[i].t, sides.x, sides.y, sides.z});
+    volume += t * t * t;
+  }
+  return volume * 4.0f * kPi / (3.0f * kDirections) / (size.x * size.y * size.z);
+}
+
+// Nothing where the scene is no hall.
+std::optional<View> view_of_hall(const RenderScene& scene, RayTracer& tracer, const Camera& outside,
+                                 float aspect) {
+  const glm::mat3 frame = axes(outside.up);
+  const float diagonal = scene.diagonal();
+  const glm::vec3 lo = scene.lo();
+  const glm::vec3 size = scene.hi() - lo;
+  const glm::vec3 inside = 0.5f * (lo + scene.hi()) - 0.2f * outside.up * glm::dot(size, outside.up);
+
+  constexpr size_t kAround = 64;
+  std::vector<glm::vec3> around;
+  for (size_t i = 0; i < kAround; ++i) {
+    const float angle = 2.0f * kPi * static_cast<float>(i) / static_cast<float>(kAround);
+    around.push_back(frame * glm::vec3(std::cos(angle), 0.0f, std::sin(angle)));
+  }
+  const std::vector<LspHit> hits = look_around(tracer, inside, around);
+  const Seen walls = look(around, hits);
+  const auto wide = std::ranges::count_if(hits, [&](const LspHit& hit) { return hit.t > 0.04f * diagonal; });
+  // A hall has walls nearly all around that face inwards, most of them some way off. The skin of a solid body
+  // faces away from whoever is inside; a hole in one is a small part of it.
+  if (walls.front + walls.back < 52 || walls.front <= 2 * walls.back || wide < 32) return std::nullopt;
+  if (visible_share(scene, tracer, inside) < 0.1f) return std::nullopt;
+
+  const auto free = [&](size_t i) { return std::min(hits[i % kAround].t, diagonal); };
+  size_t ahead = 0;
+  for (size_t i = 1; i < kAround; ++i) {
+    if (free(i) + free(i + kAround / 2) > free(ahead) + free(ahead + kAround / 2)) ahead = i;
+  }
+  if (free(ahead) < free(ahead + kAround / 2)) ahead = (ahead + kAround / 2) % kAround;
+  const size_t back = (ahead + kAround / 2) % kAround;
+  View view;
+  view.camera.up = outside.up;
+  view.camera.eye = inside + around[back] * 0.6f * free(back);
+  view.camera.target = inside - around[back] * 0.1f * diagonal;
+  view.camera.fov_degrees = 65.0f;
+  // One skin that faces inwards is either a room without an outside or a body turned inside out: a room holds
+  // more than its walls.
+  const Seen from_outside = look_through(outside, aspect, tracer);
+  const Seen from_inside = look_through(view.camera, aspect, tracer);
+  if (from_outside.back > from_outside.front && 2 * from_inside.primitives < 5 * from_outside.primitives)
+    return std::nullopt;
+  float reach = 0.0f;
+  for (const LspHit& hit : hits) reach += std::min(hit.t, 0.3f * diagonal) / static_cast<float>(kAround);
+  // Bright enough for surfaces as far away as the walls are on average.
+  view.lamp = {inside, 0.01f * diagonal, 3.0f * reach * reach};
+  return view;
+}
+
 }  // namespace
+
+glm::mat3 axes(glm::vec3 up) {
+  const glm::vec3 right(1, 0, 0);
+  return {right, up, glm::cross(right, up)};
+}
 
 LspRay Camera::ray(glm::vec2 pixel, int width, int height) const {
   const glm::vec3 forward = glm::normalize(target - eye);
-  const glm::vec3 world_up = std::abs(forward.y) > 0.999f ? glm::vec3(0, 0, 1) : glm::vec3(0, 1, 0);
-  const glm::vec3 right = glm::normalize(glm::cross(forward, world_up));
-  const glm::vec3 up = glm::cross(right, forward);
+  const glm::vec3 elsewhere = up.y > 0.5f ? glm::vec3(0, 0, 1) : glm::vec3(0, 1, 0);
+  const glm::vec3 above = std::abs(glm::dot(forward, up)) > 0.999f ? elsewhere : up;
+  const glm::vec3 right = glm::normalize(glm::cross(forward, above));
+  const glm::vec3 upward = glm::cross(right, forward);
   const float half = std::tan(fov_degrees * kPi / 360.0f);
   const float x = (2.0f * pixel.x - static_cast<float>(width)) / static_cast<float>(height) * half;
   const float y = (1.0f - 2.0f * pixel.y / static_cast<float>(height)) * half;
-  const glm::vec3 direction = glm::normalize(forward + x * right + y * up);
-  return {from_glm(eye), 0.0f, from_glm(direction), std::numeric_limits<float>::infinity()};
+  const glm::vec3 direction = glm::normalize(forward + x * right + y * upward);
+  return {from_glm(eye), 0.0f, from_glm(direction), kInfinity};
 }
 
 Camera parse_camera(const std::string& text) {
@@ -75,60 +248,21 @@ glm::ivec2 parse_size(const std::string& text) {
   return size;
 }
 
-Camera default_camera(const RenderScene& scene, RayTracer& tracer, Lamp& lamp) {
-  lamp = {};
+glm::vec3 likely_up(const RenderScene& scene) {
   const glm::vec3 size = scene.hi() - scene.lo();
-  const glm::vec3 centre = 0.5f * (scene.lo() + scene.hi());
-  const float diagonal = scene.diagonal();
-  const glm::vec3 inside(centre.x, scene.lo().y + 0.3f * size.y, centre.z);
+  const glm::vec3 y_up(0, 1, 0);
+  // Without any height it may as well stand as a picture does, and who stands is thin from front to back,
+  // too, but does not face that way alone.
+  const float across = std::min(size.x, size.y);
+  if (!(size.z < 0.4f * across) || !(size.z > 0.005f * across)) return y_up;
+  const glm::vec3 facing = scene.facing_area();
+  return facing.z > 1.5f * (facing.x + facing.y) ? glm::vec3(0, 0, 1) : y_up;
+}
 
-  std::vector<glm::vec3> around;
-  for (int i = 0; i < 64; ++i) {
-    const float angle = 2.0f * kPi * static_cast<float>(i) / 64.0f;
-    around.emplace_back(std::cos(angle), 0.0f, std::sin(angle));
-  }
-  const std::vector<LspHit> seen = look_around(tracer, inside, around);
-  std::vector<float> free;
-  size_t walls = 0;
-  size_t facing = 0;
-  size_t wide = 0;
-  for (size_t i = 0; i < seen.size(); ++i) {
-    free.push_back(seen[i].t);
-    if (std::isfinite(seen[i].t)) ++walls;
-    if (std::isfinite(seen[i].t) && glm::dot(to_glm(seen[i].normal), around[i]) < 0) ++facing;
-    if (seen[i].t > 0.04f * diagonal) ++wide;
-  }
-  // A hall has walls nearly all around that face inwards, most of them some way off. The skin of a solid body
-  // faces away from whoever is inside.
-  if (walls >= 48 && 3 * facing > 2 * walls && wide >= 32) {
-    size_t best = 0;
-    float best_length = -1.0f;
-    for (size_t i = 0; i < free.size(); ++i) {
-      const float ahead = std::min(free[i], diagonal);
-      const float behind = std::min(free[(i + 32) % 64], diagonal);
-      if (ahead + behind > best_length) {
-        best_length = ahead + behind;
-        best = i;
-      }
-    }
-    const size_t back = free[best] > free[(best + 32) % 64] ? (best + 32) % 64 : best;
-    Camera camera;
-    camera.eye = inside + around[back] * 0.6f * std::min(free[back], diagonal);
-    camera.target = inside - around[back] * 0.1f * diagonal;
-    camera.fov_degrees = 65.0f;
-    float reach = 0.0f;
-    for (const float distance : free)
-      reach += std::min(distance, 0.3f * diagonal) / static_cast<float>(free.size());
-    // Bright enough for surfaces as far away as the walls are on average.
-    lamp = {inside, 0.01f * diagonal, 3.0f * reach * reach};
-    return camera;
-  }
-  Camera camera;
-  camera.fov_degrees = 38.0f;
-  camera.target = centre;
-  camera.eye = centre + glm::normalize(glm::vec3(0.6f, 0.42f, 1.0f)) *
-                            (0.58f * diagonal / std::sin(19.0f * kPi / 180.0f));
-  return camera;
+View default_view(const RenderScene& scene, RayTracer& tracer, glm::vec3 up, float aspect) {
+  const Camera outside = view_of_object(scene, tracer, up, aspect);
+  if (const std::optional<View> hall = view_of_hall(scene, tracer, outside, aspect)) return *hall;
+  return {outside, {}};
 }
 
 bool suit(Sky& sky, const Lamp& lamp, const RenderScene& scene) {

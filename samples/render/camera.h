@@ -1,4 +1,4 @@
-// A pinhole camera, and one that suits a scene nobody has seen yet.
+// A pinhole camera, and a view that suits a scene nobody has seen yet.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -11,7 +11,8 @@ namespace lsp::sample {
 struct Camera {
   glm::vec3 eye{0.0f};
   glm::vec3 target{0.0f, 0.0f, -1.0f};
-  float fov_degrees = 55.0f;  // vertical
+  float fov_degrees = 55.0f;       // vertical
+  glm::vec3 up{0.0f, 1.0f, 0.0f};  // unit
 
   // The ray through a point of the picture: x in [0, width], y in [0, height] from the top. Its direction has
   // unit length.
@@ -26,18 +27,31 @@ std::string to_string(const Camera& camera);
 // Parses "WIDTHxHEIGHT", in pixels. Throws lsp::Failure (kUsage).
 glm::ivec2 parse_size(const std::string& text);
 
-// Inside a hall it stands where it sees far, at three tenths of the height; otherwise it looks at the whole
-// from the front, right and above. y is up.
-//
-// Where it is a hall, `lamp` is set to a light in its middle; the radius is 0 otherwise.
+// Right, up and towards the viewer, of a scene whose `up` is y or z.
+glm::mat3 axes(glm::vec3 up);
+
+// z where the scene lies flat in x and y and more of it faces up or down along z than along y, as terrain and
+// plans do; else y. Files do not say.
+glm::vec3 likely_up(const RenderScene& scene);
+
+// A light for a hall; radius 0: none.
 struct Lamp {
   glm::vec3 position{0.0f};
   float radius = 0.0f;
   float intensity = 0.0f;  // radiant
 };
-Camera default_camera(const RenderScene& scene, RayTracer& tracer, Lamp& lamp);
 
-// Makes the sky's light suit a scene that default_camera has looked at: out in the open everything is darker,
+struct View {
+  Camera camera;
+  Lamp lamp;  // in the middle of a hall
+};
+
+// Inside a hall it stands where it sees far, at three tenths of the height; otherwise it looks at the whole
+// from outside and a little above, from in front and to the right unless much more is seen from elsewhere, so
+// near that it fills a picture of `aspect` (width over height). `up`: y or z.
+View default_view(const RenderScene& scene, RayTracer& tracer, glm::vec3 up, float aspect);
+
+// Makes the sky's light suit a scene that default_view has looked at: out in the open everything is darker,
 // and in a hall without light of its own hangs the lamp; then true.
 bool suit(Sky& sky, const Lamp& lamp, const RenderScene& scene);
 

@@ -30,9 +30,12 @@ struct Arguments {
   std::string backend = "cpu";
   std::string sun;
   float verify_percent = 0.0f;
-  float exposure = 0.0f;
+  std::string up;
+  std::string exposure;
   RenderOptions options;
 };
+
+glm::vec3 named_up(const std::string& axis) { return axis == "z" ? glm::vec3(0, 0, 1) : glm::vec3(0, 1, 0); }
 
 Sky parse_sun(const std::string& text) {
   Sky sky;
@@ -46,6 +49,30 @@ Sky parse_sun(const std::string& text) {
   }
   sky.sun_direction = glm::normalize(d);
   return sky;
+}
+
+// Stops; nothing: by the picture.
+std::optional<float> parse_exposure(const Arguments& arguments) {
+  const std::string& text = arguments.exposure;
+  if (text == "auto" || (text.empty() && arguments.camera.empty())) return std::nullopt;
+  if (text.empty()) return 0.0f;
+  float stops = 0;
+  int used = 0;
+  if (std::sscanf(text.c_str(), "%f%n", &stops, &used) != 1 || static_cast<size_t>(used) != text.size() ||
+      !(std::abs(stops) <= 20.0f)) {
+    throw Failure(Exit::kUsage, "", "--exposure '" + text + "' is neither auto nor stops from -20 to 20");
+  }
+  return stops;
+}
+
+// Brings surfaces that are too dark or too bright on average into the range that a display shows well; a
+// picture within it is left alone.
+float chosen_exposure(double surface_luminance) {
+  if (!(surface_luminance > 0)) return 0.0f;
+  constexpr double kDark = 0.15;
+  constexpr double kBright = 0.7;
+  const double wanted = std::clamp(surface_luminance, kDark, kBright);
+  return static_cast<float>(std::clamp(std::log2(wanted / surface_luminance), -8.0, 8.0));
 }
 
 Effect parse_effect(const std::string& name) {
@@ -101,8 +128,109 @@ void run_heat(const Arguments& arguments, const CommonOptions& common, const Ren
   }
 }
 
+// What is looked at, and in which light.
+struct Shot {
+  Camera camera;
+  Sky sky;
+};
+
+Shot choose_shot(const Arguments& arguments, const CommonOptions& common, const char* program,
+                 const RenderScene& scene, RayTracer& tracer, const RenderOptions& options) {
+  const auto say = [&](const char* note) {
+    if (!common.quiet) std::cerr << program << ": " << arguments.file << ": " << note << "\n";
+  };
+  const bool given = !arguments.camera.empty();
+  const glm::vec3 up = !arguments.up.empty() || given ? named_up(arguments.up) : likely_up(scene);
+  Shot shot;
+  shot.sky = parse_sun(arguments.sun);
+  shot.sky.up = up;
+  if (arguments.sun.empty()) shot.sky.sun_direction = axes(up) * shot.sky.sun_direction;
+  if (given) {
+    shot.camera = parse_camera(arguments.camera);
+    shot.camera.up = up;
+    return shot;
+  }
+  if (arguments.up.empty() && up.z > 0)
+    say("lies flat in x and y: z is taken to be up; --up y where that is wrong");
+  const View view =
+      default_view(scene, tracer, up, static_cast<float>(options.width) / static_cast<float>(options.height));
+  shot.camera = view.camera;
+  if (suit(shot.sky, view.lamp, scene)) say("a hall without lights: a lamp hangs in its middle");
+  return shot;
+}
+
+// What the user should know before it starts.
+void print_notes(const Arguments& arguments, const char* program, const RenderScene& scene,
+                 bool approximate) {
+  const auto say = [&](const std::string& note) {
+    std::cerr << program << ": " << arguments.file << ": " << note << "\n";
+  };
+  for (const std::string& note : scene.notes()) say(note);
+  for (const std::string& note : unused_arguments(arguments.trace, approximate, scene.headers())) say(note);
+  if (!arguments.light_quality.empty() && !approximate) say("--light-quality does nothing: rays are exact");
+  if (!arguments.light_quality.empty() && approximate && arguments.effect == "ao")
+    say("--light-quality does nothing: ambient occlusion has no rays to lights");
+  if (arguments.verify_percent > 0 && !approximate) say("--verify does nothing: rays are exact");
+  if (arguments.verify_percent > 0 && approximate && !arguments.heat.empty())
+    say("--verify does nothing: --heat shows rays as they are");
+  const bool tables = std::ranges::any_of(scene.headers(), [](const LspHeader* header) {
+    return (header->required_features & (LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS)) != 0;
+  });
+  if (approximate && !tables) say("neither Line Spaces nor cells in the file: approximate rays are exact");
+}
+
 double mega(uint64_t rays, double seconds) {
   return seconds > 0 ? static_cast<double>(rays) / seconds * 1e-6 : 0;
+}
+
+void print_report(const Arguments& arguments, const CommonOptions& common, const RenderOptions& options,
+                  const Camera& camera, float stops, const RayTracer& tracer, const RenderReport& report) {
+  const double rate = mega(report.indirect_rays, report.indirect_seconds);
+  if (common.json) {
+    std::cout << nlohmann::ordered_json{{"file", arguments.file},
+                                        {"outputs", arguments.outputs},
+                                        {"effect", arguments.effect},
+                                        {"mode", arguments.mode},
+                                        {"near", arguments.trace.near},
+                                        {"lod", arguments.trace.lod},
+                                        {"light_quality", arguments.light_quality.empty()
+                                                              ? "as the others"
+                                                              : arguments.light_quality},
+                                        {"width", options.width},
+                                        {"height", options.height},
+                                        {"samples", options.samples},
+                                        {"bounces", options.bounces},
+                                        {"denoised", options.denoise},
+                                        {"camera", to_string(camera)},
+                                        {"up", camera.up.z > 0 ? "z" : "y"},
+                                        {"exposure", stops},
+                                        {"verify", 100.0f * options.verify},
+                                        {"backend", arguments.backend},
+                                        {"device", tracer.device()},
+                                        {"load_path", tracer.load_path()},
+                                        {"dispatches", tracer.dispatches()},
+                                        {"seconds", report.seconds},
+                                        {"primary_rays", report.primary_rays},
+                                        {"primary_seconds", report.primary_seconds},
+                                        {"shadow_rays", report.shadow_rays},
+                                        {"shadow_seconds", report.shadow_seconds},
+                                        {"indirect_rays", report.indirect_rays},
+                                        {"indirect_seconds", report.indirect_seconds},
+                                        {"indirect_mrays_per_second", rate},
+                                        {"paths", report.paths},
+                                        {"verified_paths", report.verified_paths},
+                                        {"mean_luminance", report.mean_luminance}}
+                     .dump(2)
+              << "\n";
+  } else if (!common.quiet) {
+    std::printf("%s: %d x %d, %u samples, %s, %s, %s\n", arguments.outputs.front().c_str(), options.width,
+                options.height, options.samples, arguments.effect.c_str(), arguments.mode.c_str(),
+                tracer.device().c_str());
+    std::printf(
+        "%.2f s; indirect %.2f Mrays in %.2f s: %.2f Mrays/s; primary %.2f s, shadow %.2f s; camera %s\n",
+        report.seconds, static_cast<double>(report.indirect_rays) * 1e-6, report.indirect_seconds, rate,
+        report.primary_seconds, report.shadow_seconds, to_string(camera).c_str());
+  }
 }
 
 void run(const Arguments& arguments, const CommonOptions& common, const char* program) {
@@ -121,8 +249,9 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
       throw Failure(Exit::kUsage, output, "pictures are written as .png or .pfm; choose one of the two");
     }
   }
-  Sky sky = parse_sun(arguments.sun);
-  Camera camera = arguments.camera.empty() ? Camera{} : parse_camera(arguments.camera);
+  const std::optional<float> exposure = parse_exposure(arguments);
+  if (!arguments.camera.empty()) parse_camera(arguments.camera);
+  parse_sun(arguments.sun);
 
   // Without this oneTBB would never use more threads than there are cores.
   std::optional<tbb::global_control> allowed;
@@ -130,98 +259,29 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
     allowed.emplace(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(options.threads));
   }
   const RenderScene scene(arguments.file);
-  if (!common.quiet) {
-    for (const std::string& note : scene.notes())
-      std::cerr << program << ": " << arguments.file << ": " << note << "\n";
-    for (const std::string& note : unused_arguments(arguments.trace, approximate, scene.headers()))
-      std::cerr << program << ": " << arguments.file << ": " << note << "\n";
-    if (!arguments.light_quality.empty() && (!approximate || options.effect == Effect::kAmbientOcclusion)) {
-      std::cerr << program << ": " << arguments.file << ": --light-quality does nothing: "
-                << (approximate ? "ambient occlusion has no rays to lights" : "rays are exact") << "\n";
-    }
-    if (arguments.verify_percent > 0 && (!approximate || !arguments.heat.empty())) {
-      std::cerr << program << ": " << arguments.file << ": --verify does nothing: "
-                << (approximate ? "--heat shows rays as they are" : "rays are exact") << "\n";
-    }
-    const bool tables = std::ranges::any_of(scene.headers(), [](const LspHeader* header) {
-      return (header->required_features & (LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS)) != 0;
-    });
-    if (approximate && !tables) {
-      std::cerr << program << ": " << arguments.file
-                << ": neither Line Spaces nor cells in the file: approximate rays are exact\n";
-    }
-  }
+  if (!common.quiet) print_notes(arguments, program, scene, approximate);
   const uint32_t uses = LSP_USE_EXACT | (approximate ? LSP_USE_APPROXIMATE : 0u);
   const auto tracer = arguments.backend == "vulkan" ? make_vulkan_tracer(scene, uses)
                                                     : make_cpu_tracer(scene, options.threads);
-  if (arguments.camera.empty()) {
-    Lamp lamp;
-    camera = default_camera(scene, *tracer, lamp);
-    if (suit(sky, lamp, scene) && !common.quiet) {
-      std::cerr << program << ": " << arguments.file
-                << ": a hall without lights: a lamp hangs in its middle\n";
-    }
-  }
-
-  if (!arguments.heat.empty()) return run_heat(arguments, common, scene, camera, options);
+  Shot shot = choose_shot(arguments, common, program, scene, *tracer, options);
+  if (!arguments.heat.empty()) return run_heat(arguments, common, scene, shot.camera, options);
   const bool show_progress = !common.quiet && isatty(STDERR_FILENO) != 0;
   RenderReport report;
-  const Picture picture = render(scene, sky, camera, options, *tracer, report, [&](double done) {
+  const Picture picture = render(scene, shot.sky, shot.camera, options, *tracer, report, [&](double done) {
     if (show_progress) std::fprintf(stderr, "\rrendering %3.0f %%", 100.0 * done);
   });
   if (show_progress) std::fprintf(stderr, "\r               \r");
   const bool grey = options.effect == Effect::kAmbientOcclusion;
+  const float stops = exposure ? *exposure : chosen_exposure(report.surface_luminance);
   for (const std::string& output : arguments.outputs) {
     Picture shown = picture;
     if (std::filesystem::path(output).extension() == ".png" && !grey) {
-      for (glm::vec3& pixel : shown.pixels) pixel *= std::exp2(arguments.exposure);
+      for (glm::vec3& pixel : shown.pixels) pixel *= std::exp2(stops);
     }
     write_picture(output, shown, grey ? Transfer::kDisplay : Transfer::kToneMapped);
   }
 
-  const double rate = mega(report.indirect_rays, report.indirect_seconds);
-  if (common.json) {
-    std::cout << nlohmann::ordered_json{{"file", arguments.file},
-                                        {"outputs", arguments.outputs},
-                                        {"effect", arguments.effect},
-                                        {"mode", arguments.mode},
-                                        {"near", arguments.trace.near},
-                                        {"lod", arguments.trace.lod},
-                                        {"light_quality", arguments.light_quality.empty()
-                                                              ? "as the others"
-                                                              : arguments.light_quality},
-                                        {"width", options.width},
-                                        {"height", options.height},
-                                        {"samples", options.samples},
-                                        {"bounces", options.bounces},
-                                        {"denoised", options.denoise},
-                                        {"camera", to_string(camera)},
-                                        {"backend", arguments.backend},
-                                        {"device", tracer->device()},
-                                        {"load_path", tracer->load_path()},
-                                        {"dispatches", tracer->dispatches()},
-                                        {"seconds", report.seconds},
-                                        {"primary_rays", report.primary_rays},
-                                        {"primary_seconds", report.primary_seconds},
-                                        {"shadow_rays", report.shadow_rays},
-                                        {"shadow_seconds", report.shadow_seconds},
-                                        {"indirect_rays", report.indirect_rays},
-                                        {"indirect_seconds", report.indirect_seconds},
-                                        {"indirect_mrays_per_second", rate},
-                                        {"paths", report.paths},
-                                        {"verified_paths", report.verified_paths},
-                                        {"mean_luminance", report.mean_luminance}}
-                     .dump(2)
-              << "\n";
-  } else if (!common.quiet) {
-    std::printf("%s: %d x %d, %u samples, %s, %s, %s\n", arguments.outputs.front().c_str(), options.width,
-                options.height, options.samples, arguments.effect.c_str(), arguments.mode.c_str(),
-                tracer->device().c_str());
-    std::printf(
-        "%.2f s; indirect %.2f Mrays in %.2f s: %.2f Mrays/s; primary %.2f s, shadow %.2f s; camera %s\n",
-        report.seconds, static_cast<double>(report.indirect_rays) * 1e-6, report.indirect_seconds, rate,
-        report.primary_seconds, report.shadow_seconds, to_string(camera).c_str());
-  }
+  print_report(arguments, common, options, shot.camera, stops, *tracer, report);
 }
 
 }  // namespace
@@ -276,9 +336,14 @@ int main(int argc, char** argv) {
                  "Reach of --effect ao in diagonals of the scene (default 0.1)")
       ->check(CLI::Range(1e-6f, 1e6f));
   app.add_flag("--denoise", a.options.denoise, "Filter the noise of few samples out of the picture");
+  app.add_option(
+         "--up", a.up,
+         "Which axis is up: y or z (default y; without --camera z for a scene that lies flat in x and y)")
+      ->check(CLI::IsMember({"y", "z"}));
   app.add_option("--sun", a.sun, "Direction towards the sun");
-  app.add_option("--exposure", a.exposure, "Stops to brighten a .png by (default 0)")
-      ->check(CLI::Range(-20.0f, 20.0f));
+  app.add_option("--exposure", a.exposure,
+                 "Stops to brighten a .png by, or auto: what is too dark or too bright is brought into range "
+                 "(default auto, with --camera 0)");
   app.add_option("--backend", a.backend,
                  "Where rays are traced (default cpu); the instances of a scene are found on the CPU "
                  "either way")
@@ -289,8 +354,8 @@ int main(int argc, char** argv) {
       app, "lsp-render room.lsp -o room.png --effect diffuse --mode approximate",
       {{"What most people need",
         {"FILE.lsp", "--output FILE", "--effect", "--mode", "--camera EYE:TARGET:ANGLE", "--samples"}},
-       {"The picture", {"--size WxH", "--exposure STOPS", "--denoise", "--heat"}},
-       {"Light", {"--bounces", "--radius", "--sun X,Y,Z"}},
+       {"The picture", {"--size WxH", "--exposure STOPS|auto", "--denoise", "--heat"}},
+       {"Light", {"--bounces", "--radius", "--up", "--sun X,Y,Z"}},
        {"Approximate mode",
         {"--near", "--lod", "--quality", "--max-loss PERCENT", "--light-quality", "--verify PERCENT"}},
        {"The machine", {"--backend", "--threads"}}});

@@ -126,6 +126,34 @@ RenderScene::Corners RenderScene::corners(uint32_t instance, const LspTriangle& 
   return {linear * glm::dvec3(v0) + translation, linear * glm::dvec3(e1), linear * glm::dvec3(e2)};
 }
 
+std::vector<RenderScene::Corners> RenderScene::some_triangles(size_t most) const {
+  size_t total = 0;
+  for (uint32_t instance = 0; instance < instance_count(); ++instance)
+    total += asset_of(instance).scene->header->triangle_count;
+  const size_t step = total / most + 1;
+  std::vector<Corners> some;
+  size_t next = 0;  // to take, counted from the instance's first
+  for (uint32_t instance = 0; instance < instance_count(); ++instance) {
+    const lsp_scene& scene = *asset_of(instance).scene;
+    for (; next < scene.header->triangle_count; next += step)
+      some.push_back(corners(instance, scene.triangles[next]));
+    next -= scene.header->triangle_count;
+  }
+  return some;
+}
+
+std::vector<glm::vec3> RenderScene::some_corners(size_t most) const {
+  std::vector<glm::vec3> points;
+  for (const Corners& c : some_triangles(most)) points.insert(points.end(), {c.v0, c.v0 + c.e1, c.v0 + c.e2});
+  return points;
+}
+
+glm::vec3 RenderScene::facing_area() const {
+  glm::dvec3 sum(0.0);
+  for (const Corners& c : some_triangles(1u << 20)) sum += glm::abs(glm::dvec3(glm::cross(c.e1, c.e2)));
+  return 0.5 * sum;
+}
+
 void RenderScene::find_emitters() {
   double total = 0;
   std::vector<double> powers;
@@ -226,16 +254,16 @@ SurfacePoint RenderScene::surface(const LspRay& ray, const LspHit& hit) const {
 }
 
 glm::vec3 Sky::radiance(glm::vec3 direction) const {
-  const float up = direction.y;
+  const float height = glm::dot(direction, up);
   const glm::vec3 zenith(0.28f, 0.52f, 1.0f);
   const glm::vec3 horizon(0.86f, 0.92f, 1.0f);
   const glm::vec3 ground(0.24f, 0.22f, 0.20f);
-  const float haze = std::pow(1.0f - std::max(up, 0.0f), 3.0f);
+  const float haze = std::pow(1.0f - std::max(height, 0.0f), 3.0f);
   const glm::vec3 clear = glm::mix(zenith, horizon, haze) * 2.2f;
   // A soft glow about the sun.
   const float toward = std::max(glm::dot(direction, sun_direction), 0.0f);
   const glm::vec3 glow = glm::vec3(1.0f, 0.85f, 0.6f) * (0.9f * std::pow(toward, 24.0f));
-  const float horizon_blend = glm::clamp(up * 12.0f + 0.5f, 0.0f, 1.0f);
+  const float horizon_blend = glm::clamp(height * 12.0f + 0.5f, 0.0f, 1.0f);
   return brightness * glm::mix(ground, clear + glow, horizon_blend);
 }
 

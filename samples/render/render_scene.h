@@ -70,6 +70,10 @@ class RenderScene {
   glm::vec3 lo() const;
   glm::vec3 hi() const;
   float diagonal() const { return glm::length(hi() - lo()); }
+  // Corners of about `most` triangles, spread over all instances; of all where there are fewer.
+  std::vector<glm::vec3> some_corners(size_t most) const;
+  // Area of triangles by what faces x, y and z, either way; of many triangles, of a part of them.
+  glm::vec3 facing_area() const;
   // What the file does not have and what stands in for it; empty if nothing is missing.
   const std::vector<std::string>& notes() const { return notes_; }
 
@@ -118,6 +122,7 @@ class RenderScene {
   uint32_t instance_count() const;
   const Asset& asset_of(uint32_t instance) const;
   Corners corners(uint32_t instance, const LspTriangle& triangle) const;
+  std::vector<Corners> some_triangles(size_t most) const;
 
   std::string path_;
   std::optional<SceneFile> file_;
@@ -128,8 +133,9 @@ class RenderScene {
   std::vector<std::string> notes_;
 };
 
-// The light that is no part of the scene: a clear sky with a sun in it, and perhaps a lamp. y is up.
+// The light that is no part of the scene: a clear sky with a sun in it, and perhaps a lamp.
 struct Sky {
+  glm::vec3 up = glm::vec3(0.0f, 1.0f, 0.0f);  // unit
   glm::vec3 sun_direction = glm::normalize(glm::vec3(-0.28f, 0.80f, 0.53f));
   glm::vec3 sun_irradiance = glm::vec3(1.0f, 0.87f, 0.70f) * 9.0f;
   float sun_radius_rad = 0.012f;

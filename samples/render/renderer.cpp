@@ -104,6 +104,7 @@ class Renderer {
     albedo_ = guides_.normal = guides_.position = Picture(options.width, options.height);
     guides_.depth.resize(pixels);
     met_.resize(pixels);
+    covered_.resize(pixels);
     order_pixels();
   }
 
@@ -126,9 +127,17 @@ class Renderer {
     }
     finish();
     double total_luminance = 0;
-    for (const glm::vec3& p : picture_.pixels) {
-      total_luminance += static_cast<double>(luminance(p));
+    double surface_log = 0;
+    size_t surface_pixels = 0;
+    for (size_t i = 0; i < picture_.pixels.size(); ++i) {
+      const auto bright = static_cast<double>(luminance(picture_.pixels[i]));
+      total_luminance += bright;
+      if (covered_[i] == 0) continue;
+      surface_log += std::log(std::max(bright, 1e-4));
+      ++surface_pixels;
     }
+    if (surface_pixels > 0)
+      report_.surface_luminance = std::exp(surface_log / static_cast<double>(surface_pixels));
     report_.mean_luminance = total_luminance / static_cast<double>(picture_.pixels.size());
     report_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     return std::move(picture_);
@@ -251,6 +260,7 @@ class Renderer {
     for (uint32_t i = 0; i < count_; ++i) {
       if (std::isfinite(hits_[i].t)) {
         surfaces_.push_back({i, {}, {}});
+        covered_[order_[first_ + i]] = 1;
       } else if (options_.effect == Effect::kAmbientOcclusion) {
         add(i, kSharp, glm::vec3(1.0f));
       } else if (wants(Effect::kDirect)) {
@@ -615,7 +625,8 @@ class Renderer {
   std::array<std::vector<float>, kComponents> squares_;  // of luminance
   Picture albedo_;
   Guides guides_;
-  std::vector<float> met_;  // samples that met a surface
+  std::vector<float> met_;        // samples that met a surface, for the denoiser
+  std::vector<uint8_t> covered_;  // whether any did
 
   // The wave's state, kept from sample to sample for its memory.
   size_t first_ = 0;

@@ -184,10 +184,11 @@ void run(Arguments& arguments, const CommonOptions& common) {
   say(common, arguments.file, unused_arguments(arguments.trace, true, header));
   if ((header.required_features & (LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS)) == 0)
     say(common, arguments.file, {"neither Line Spaces nor cells in the file: both halves are exact"});
+  const float aspect = static_cast<float>(size.x) / static_cast<float>(size.y);
+  const View view = default_view(scene, *make_cpu_tracer(scene, 0), glm::vec3(0, 1, 0), aspect);
+  state.camera = view.camera;
   Sky sky;
-  Lamp lamp;
-  state.camera = default_camera(scene, *make_cpu_tracer(scene, 0), lamp);
-  if (suit(sky, lamp, scene))
+  if (suit(sky, view.lamp, scene))
     say(common, arguments.file, {"a hall without lights: a lamp hangs in its middle"});
   if (camera) state.camera = *camera;
 

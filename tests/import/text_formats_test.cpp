@@ -164,6 +164,28 @@ TEST_F(Obj, OpacityInEitherForm) {
   EXPECT_EQ(opacity("d 0\n"), 0.0f) << "left out";
 }
 
+TEST_F(Obj, ZBrushColours) {
+  const std::string corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\n", faces = "f 1 2 3\n";
+  const std::string about = "#MRGB block: The following ZBrush Vertex Color (Polypaint)\n";
+  const Mesh mesh =
+      import("a.obj", "# File exported by ZBrush\n" + corners + "#MRGB ffff0000ffFF0000\n#MRGB 0000bC01\n" +
+                          "# End of MRGB block\n" + faces);
+  EXPECT_NEAR(mesh.color(0).base_color.r, 2 / 3.0f, 1e-5f);
+  EXPECT_NEAR(mesh.color(0).base_color.g, lsp::linear_of_srgb(0xBC / 255.0) / 3, 1e-5);
+  EXPECT_NEAR(mesh.color(0).base_color.b, lsp::linear_of_srgb(1 / 255.0) / 3, 1e-5);
+  EXPECT_TRUE(mesh.notes.empty());
+  const Mesh dark = import("a.obj", corners + "#MRGB ff010101ff010101ff010101\n" + faces);
+  EXPECT_NEAR(dark.color(0).base_color.r, lsp::linear_of_srgb(1 / 255.0), 1e-6)
+      << "of 255, whatever is largest";
+  const Mesh few = import("a.obj", corners + "#MRGB ff000000\n" + faces);
+  EXPECT_NEAR(few.color(0).base_color.r, 2 / 3.0f, 1e-5f);
+  EXPECT_TRUE(has_note(few, "colour 1 vertices of 3"));
+  EXPECT_TRUE(import("a.obj", corners + about + faces).notes.size() == 1u) << "words in place of digits";
+  EXPECT_TRUE(has_note(import("a.obj", corners + "#MRGB ff0000\n" + faces), "#MRGB"));
+  EXPECT_TRUE(
+      has_note(import("a.obj", "v 0 0 0 1 0 0\n" + corners.substr(8) + "#MRGB ff000000\n" + faces), "#MRGB"));
+}
+
 TEST_F(Obj, VertexColours) {
   const std::string faces = "f 1 2 3\n";
   const Mesh mesh = import("a.obj", "v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 0 0.7372549 0\n" + faces);
@@ -570,6 +592,83 @@ TEST_F(Ply, ColoursOfVerticesAndFaces) {
   EXPECT_TRUE(has_note(faces, "alpha"));
 }
 
+// Upper row red, green; lower row blue, white.
+std::string four_colors() {
+  return rgba_png(2, 2, {255, 0, 0, 255, 0, 255, 0, 255, 0, 0, 255, 255, 255, 255, 255, 255});
+}
+
+TEST_F(Ply, TexturesByCoordinatesOfVertices) {
+  write("x.png", four_colors());
+  const auto textured = [&](const std::string& names, const std::string& uv) {
+    return import(
+        "a.ply",
+        "ply\nformat ascii 1.0\ncomment TextureFile x.png\nelement vertex 3\nproperty float x\nproperty "
+        "float y\nproperty float z\nproperty float " +
+            names.substr(0, names.find(' ')) + "\nproperty float " + names.substr(names.find(' ') + 1) +
+            "\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 " + uv + "\n1 0 0 " +
+            uv + "\n0 1 0 " + uv + "\n3 0 1 2\n");
+  };
+  for (const std::string names : {"s t", "u v", "texture_u texture_v"}) {
+    const Mesh lower_left = textured(names, "0.25 0.25");
+    EXPECT_EQ(lower_left.color(0).base_color, glm::vec3(0, 0, 1)) << names << ": v grows upwards";
+    EXPECT_TRUE(lower_left.notes.empty()) << lower_left.notes.front();
+    EXPECT_EQ(lower_left.sources[0].size(), 2u) << "the picture is a file that the mesh depends on";
+    EXPECT_EQ(textured(names, "0.75 0.75").color(0).base_color, glm::vec3(0, 1, 0)) << names;
+  }
+  EXPECT_TRUE(has_note(textured("s other", "0.25 0.25"), "the texture x.png is not read"));
+  std::filesystem::remove(folder_ / "x.png");
+  const Mesh without = textured("s t", "0.25 0.25");
+  EXPECT_TRUE(has_note(without, "the picture x.png is not there"));
+  EXPECT_EQ(without.color(0).base_color, glm::vec3(0.8f));
+}
+
+// As MeshLab writes them: several textures, a number and six coordinates a face, here of either encoding.
+TEST_F(Ply, TexturesByCoordinatesOfFaces) {
+  write("x.png", four_colors());
+  write("a grey.png", png_bytes<uint8_t>(1, 1, PNG_FORMAT_GRAY, {255}));
+  const std::string header =
+      "comment TextureFile x.png\ncomment TextureFile a grey.png\nelement vertex 3\nproperty float "
+      "x\nproperty float "
+      "y\nproperty float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nelement face "
+      "4\nproperty "
+      "list uchar float texcoord\nproperty list uchar int vertex_indices\nproperty int "
+      "texnumber\nend_header\n";
+  const float corners[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+  std::string text = "ply\nformat ascii 1.0\n" + header + "0 0 0 9 9 9\n1 0 0 9 9 9\n0 1 0 9 9 9\n";
+  std::string binary = "ply\nformat binary_little_endian 1.0\n" + header;
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) append(binary, corners[3 * i + k]);
+    binary += "\t\t\t";
+  }
+  const auto face = [&](int texture, int coordinates, float u, float v) {
+    text += std::to_string(2 * coordinates);
+    binary += char(2 * coordinates);
+    for (int i = 0; i < coordinates; ++i) {
+      for (const float value : {u, v}) text.append(1, ' ').append(std::to_string(value));
+      append(binary, u);
+      append(binary, v);
+    }
+    text.append(" 3 0 1 2 ").append(std::to_string(texture)).append(1, '\n');
+    binary += '\3';
+    for (const int32_t number : {0, 1, 2, texture}) append(binary, number);
+  };
+  face(0, 3, 0.25f, 0.75f);
+  face(0, 3, 1.75f, 0.25f);  // repeats
+  face(1, 3, 0.5f, 0.5f);
+  face(7, 3, 0.5f, 0.5f);
+  for (const std::string& bytes : {text, binary}) {
+    const Mesh mesh = import("a.ply", bytes);
+    ASSERT_EQ(mesh.triangles.size(), 4u);
+    EXPECT_EQ(mesh.color(0).base_color, glm::vec3(1, 0, 0));
+    EXPECT_EQ(mesh.color(1).base_color, glm::vec3(1, 1, 1));
+    EXPECT_EQ(mesh.color(2).base_color, glm::vec3(1, 1, 1));
+    EXPECT_EQ(mesh.color(3).base_color, glm::vec3(0.8f)) << "no such texture";
+    EXPECT_EQ(mesh.materials[mesh.material_ids[2]].name, "a grey.png");
+    EXPECT_TRUE(has_note(mesh, "that no comment names"));
+    EXPECT_TRUE(has_note(mesh, "textures say them")) << "the colours of vertices";
+  }
+}
+
 TEST_F(Ply, HeadersThatPromiseTooMuchAreRefusedAtOnce) {
   const std::string start = "ply\nformat binary_little_endian 1.0\nelement vertex ";
   const std::string xyz = "\nproperty float x\nproperty float y\nproperty float z\n";
@@ -641,6 +740,36 @@ TEST_F(Stl, TextWithSeveralSolidsInAnyCase) {
   EXPECT_EQ(mesh.rejected.degenerate, 1u);
   EXPECT_EQ(mesh.positions.size(), 3u);
   EXPECT_EQ(refusal("b.stl", "solid a\n" + facet.substr(0, facet.size() - 11)).exit, Exit::kInvalid);
+}
+
+TEST_F(Stl, TextOnOneLine) {
+  const std::string facet =
+      " facet normal 0 0 1 outer loop vertex 0 0 0 vertex 1 0 0 vertex 0 1 0 endloop endfacet";
+  const std::string upside_down =
+      " FACET NORMAL 0 0 -1 outer loop vertex 0 0 1 vertex 0 1 1 vertex 1 0 1 endloop endfacet";
+  const Mesh mesh = import("a.stl", "solid a facet for the normal user" + facet + upside_down +
+                                        " endsolid a facet solid b" + facet + " endsolid b");
+  ASSERT_EQ(mesh.triangles.size(), 3u);
+  EXPECT_EQ(corner(mesh, 1, 2), glm::vec3(1, 0, 1));
+  EXPECT_EQ(mesh.normals[0][0], glm::vec3(0, 0, 1));
+  EXPECT_EQ(mesh.normals[1][0], glm::vec3(0, 0, -1));
+  EXPECT_EQ(mesh.primitive_count, 3u);
+  EXPECT_EQ(import("a.stl", "solid" + facet).triangles.size(), 1u) << "short, and without an end";
+  EXPECT_EQ(refusal("b.stl", "solid a" + facet + facet.substr(0, facet.size() - 9)).exit, Exit::kInvalid);
+}
+
+TEST_F(Stl, TextBehindCommentsAndBlankLines) {
+  const std::string facet =
+      "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0 # here\nvertex 0 1 0\nendloop\nendfacet\n";
+  for (const std::string start : {"# exported by something\n", "\n \n\t\n",
+                                  "\r\n\r\n; a facet normal 1 0 0\r\n", "// vertex 1 2 3\n!x\n"}) {
+    EXPECT_EQ(import("a.stl", start + "solid a\n" + facet + "# between\n" + facet + "endsolid a\n")
+                  .triangles.size(),
+              2u)
+        << start;
+  }
+  EXPECT_EQ(import("a.stl", binary_stl("# no text", 3, 3)).triangles.size(), 3u);
+  EXPECT_EQ(import("a.stl", binary_stl("solid facet normal 0 0 1", 3, 3) + "x").triangles.size(), 3u);
 }
 
 TEST_F(Off, CommentsColoursBrokenLinesAndKeywords) {

@@ -38,7 +38,7 @@ Figures example() {
                                   {"rmse", 0.0},
                                   {"relative_mean", 0.0},
                                   {"pixels_over_5_percent", 0.0}};
-  return {"a <scene>", 0.125, bake, render, approximate, compare, {}};
+  return {"a <scene>", 0.125, bake, render, approximate, compare, {}, {}, {}};
 }
 
 TEST(Page, Base64) {
@@ -88,6 +88,50 @@ TEST(Page, TellsOfCellsAndTheirDial) {
     EXPECT_NE(page.find(part), std::string::npos) << part;
   EXPECT_EQ(page.find("Line Spaces"), std::string::npos);
   EXPECT_NE(make_summary(figures).find("fast:        4.50 times"), std::string::npos);
+}
+
+TEST(Page, DrawsTheDialsCurve) {
+  Figures figures = example();
+  figures.bake["cells"] = {{"grid", {24, 10, 15}}, {"filled", 2130}, {"planes", 1}, {"splits", 1}};
+  figures.others.push_back({"fast", figures.approximate, figures.compare});
+  EXPECT_EQ(make_page(figures, {}).find("<svg"), std::string::npos);
+  figures.curve_exact = figures.exact;
+  const auto add = [&](const char* name, double speed, double error) {
+    nlohmann::json approximate = figures.approximate, compare = figures.compare;
+    approximate["indirect_mrays_per_second"] = 2.0 * speed;
+    compare["relative_mean"] = error;
+    figures.curve.push_back({name, approximate, compare});
+  };
+  add("fast", 3.25, 0.0575);
+  add("balanced", 1.75, 0.0225);
+  add("3", 1.25, 0.0125);
+  const auto drawing = [&] {
+    const std::string page = make_page(figures, {});
+    const size_t begin = page.find("<svg");
+    return begin == page.npos ? "" : page.substr(begin, page.find("</svg>") - begin);
+  };
+  const std::string page = make_page(figures, {});
+  const std::string svg = drawing();
+  size_t circles = 0;
+  for (size_t at = svg.find("<circle"); at != svg.npos; at = svg.find("<circle", at + 1)) ++circles;
+  EXPECT_EQ(circles, 3u);
+  EXPECT_LT(svg.find(">3</text>"), svg.find(">balanced</text>")) << "in the order of their errors";
+  EXPECT_LT(svg.find(">balanced</text>"), svg.find(">fast</text>"));
+  for (const char* part : {"nan", "inf"}) EXPECT_EQ(svg.find(part), std::string::npos) << part;
+  for (const char* part : {"--max-loss 3", "3.25</td><td>5.75 %", "1.25</td><td>1.25 %"})
+    EXPECT_NE(page.find(part), std::string::npos) << part;
+  // Equal pictures, as of a scene that tables answer without error, are drawn, too.
+  for (Figures::Quality& point : figures.curve) point.compare["relative_mean"] = 0.0;
+  EXPECT_NE(drawing().find("<circle"), std::string::npos);
+  EXPECT_EQ(drawing().find("nan"), std::string::npos);
+}
+
+TEST(Page, ComparesInPlaceByKeyboardToo) {
+  const std::string page = make_page(example(), {"one", "two", "three"});
+  for (const char* part :
+       {"type=\"range\"", "<button id=\"blink\"", "<button id=\"map\"", "aria-pressed", "'keydown'",
+        "class=\"error\" alt=\"error map\" src=\"data:image/png;base64,dGhyZWU=\""})
+    EXPECT_NE(page.find(part), std::string::npos) << part;
 }
 
 TEST(Page, SaysWhereThereAreNoTables) {

@@ -158,8 +158,8 @@ TEST_F(Programs, BouncesFromTablesAreNoDarker) {
     return (sum.x + sum.y + sum.z) / static_cast<double>(3 * picture.pixels.size());
   };
   ASSERT_EQ(run("lsp-bake " + file("spheres.glb") + " -o " + file("fine.lsp") + " --base bvh --quiet"), 0);
-  const double exact = mean(render("fine", "exact", "--effect diffuse", 128));
-  const double approximate = mean(render("fine", "tables", "--effect diffuse --mode approximate", 128));
+  const double exact = mean(render("fine", "exact", "--effect diffuse", 512));
+  const double approximate = mean(render("fine", "tables", "--effect diffuse --mode approximate", 512));
   EXPECT_NEAR(approximate, exact, 0.035 * exact);
 }
 

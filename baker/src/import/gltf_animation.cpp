@@ -157,7 +157,9 @@ void pose_document(GltfDocument& document, GltfAccessors& accessors, PoseRequest
   for (size_t i = 0; i < animations.size() && request.known.size() < kMostNames; ++i)
     request.known.push_back(in_words(animations, i));
   if (played < 0) {
-    builder.note(document.file + ": its animations are not played, the mesh is taken at rest");
+    builder.note(document.file +
+                 ": its animations are not played, the mesh is taken at rest; --time SECONDS takes it as "
+                 "they have it");
     return;
   }
   request.met = true;

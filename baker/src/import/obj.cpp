@@ -1,6 +1,7 @@
-// Wavefront OBJ: polygons, normals, materials, texture coordinates, vertex colours. Lines, points, curves and
-// surfaces hold no triangles.
+// Wavefront OBJ: polygons, normals, materials, texture coordinates, vertex colours (ZBrush's, too). Lines,
+// points, curves and surfaces hold no triangles.
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <map>
 #include <set>
@@ -48,6 +49,7 @@ class ObjReader {
       builder_.note(file_ + ": " + std::to_string(other_elements_) +
                     " lines, points, curves or surfaces hold no triangle");
     }
+    use_polypaint();
     soup_.make_colors_linear();
     add_polygons(file_, soup_, builder_);
   }
@@ -71,6 +73,8 @@ class ObjReader {
     } else if (word == "mtllib") {
       builder_.budget().charge(file_, line.size() + 128);
       libraries_.emplace_back(trim(line));
+    } else if (word == "#MRGB") {
+      read_polypaint(line);
     } else if (word == "l" || word == "p" || word == "curv" || word == "curv2" || word == "surf") {
       ++other_elements_;
     }
@@ -108,6 +112,37 @@ class ObjReader {
     if (!given && soup_.colors.empty()) return;
     while (soup_.colors.size() + 1 < soup_.positions.size()) push(soup_.colors, kNoColor);
     push(soup_.colors, given ? color : kNoColor);
+  }
+
+  // "#MRGB" and for each of the next vertices eight hexadecimal digits: mask, red, green, blue. ZBrush writes
+  // some 64 of them a line.
+  void read_polypaint(std::string_view line) {
+    constexpr size_t kDigits = 8;
+    line = trim(line);
+    for (; line.size() >= kDigits; line.remove_prefix(kDigits)) {
+      uint32_t mrgb = 0;
+      const auto result = std::from_chars(line.data(), line.data() + kDigits, mrgb, 16);
+      if (result.ec != std::errc() || result.ptr != line.data() + kDigits) break;
+      push(polypaint_, glm::vec3(mrgb >> 16 & 255, mrgb >> 8 & 255, mrgb & 255) / 255.0f);
+    }
+    bad_polypaint_ = bad_polypaint_ || !line.empty();
+  }
+
+  // Colours that stand with the vertices themselves win.
+  void use_polypaint() {
+    if (bad_polypaint_)
+      builder_.note(file_ + ": an #MRGB line is not eight hexadecimal digits a vertex, its rest is not read");
+    if (polypaint_.empty()) return;
+    if (!soup_.colors.empty()) {
+      builder_.note(file_ + ": the colours of #MRGB lines are not read, those beside the vertices hold");
+      return;
+    }
+    if (polypaint_.size() != soup_.positions.size()) {
+      builder_.note(file_ + ": #MRGB lines colour " + std::to_string(polypaint_.size()) + " vertices of " +
+                    std::to_string(soup_.positions.size()) + ", the others are white");
+    }
+    soup_.colors = std::move(polypaint_);
+    soup_.colors.resize(std::min(soup_.colors.size(), soup_.positions.size()));
   }
 
   void read_face(std::string_view line) {
@@ -217,6 +252,8 @@ class ObjReader {
   std::vector<std::string> libraries_;
   size_t libraries_tried_ = 0;
   uint64_t other_elements_ = 0;
+  std::vector<glm::vec3> polypaint_;  // of #MRGB lines, by vertex
+  bool bad_polypaint_ = false;
 };
 
 }  // namespace

@@ -1,8 +1,11 @@
 // PLY, ASCII and binary of either byte order: vertex x y z, nx ny nz, red green blue; face vertex_indices (or
-// vertex_index); tristrips. Every other element and property is skipped by its type.
+// vertex_index); tristrips. With textures, which comments name: vertex s t (or u v, texture_u texture_v), or
+// face texcoord, and face texnumber. Every other element and property is skipped by its type.
 #include <algorithm>
 #include <cmath>
+#include <span>
 
+#include "import/mtl_textures.h"
 #include "import/ply_file.h"
 #include "import/polygons.h"
 #include "import/readers.h"
@@ -17,10 +20,11 @@ using namespace ply;
 
 class PlyReader {
  public:
-  PlyReader(const std::string& file, Body& body, MeshBuilder& builder)
-      : file_(file), body_(body), builder_(builder) {}
+  PlyReader(const std::filesystem::path& path, const std::string& file, Body& body, MeshBuilder& builder)
+      : folder_(path.parent_path()), file_(file), body_(body), builder_(builder) {}
 
   void read(const Header& header) {
+    textured_ = !header.textures.empty();
     for (const Element& element : header.elements) {
       has_normals_ = has_normals_ || (element.name == "vertex" && holds_normals(element));
     }
@@ -37,11 +41,10 @@ class PlyReader {
         if (element.count > 0) builder_.note(file_ + ": the element " + element.name + " is not read");
       }
     }
-    soup_.make_colors_linear();
-    for (const std::string& name : header.textures)
-      builder_.note(file_ + ": the texture " + name + " is not read, its coordinates neither");
     if (translucent_) builder_.note(file_ + ": alpha of vertices or faces is not read, all count as solid");
     soup_.material = builder_.default_material();
+    use_textures(header.textures);
+    soup_.make_colors_linear();
     add_polygons(file_, soup_, builder_);
   }
 
@@ -124,8 +127,24 @@ class PlyReader {
       builder_.note(file_ + ": of each " + element.name + " " + names + " is not read");
   }
 
+  // A property's place among texture coordinates, 0 or 1; -1: it is none.
+  int texcoord_of(const Property& property) const {
+    if (!textured_ || property.is_list) return -1;
+    for (const std::string_view first : {"s", "u", "texture_s", "texture_u"}) {
+      if (equals_ignoring_case(property.name, first)) return 0;
+    }
+    for (const std::string_view second : {"t", "v", "texture_t", "texture_v"}) {
+      if (equals_ignoring_case(property.name, second)) return 1;
+    }
+    return -1;
+  }
+
+  // v grows upwards, as in OBJ.
+  static glm::dvec2 from_upper_left(double u, double v) { return {u, 1 - v}; }
+
   void read_vertices(const Element& element) {
-    // Where each property goes: 0..2 position, 3..5 normal, 6.. colour, -1 nowhere.
+    // Where each property goes: 0..2 position, 3..5 normal, 6..9 colour, 10 and 11 texture coordinates, -1
+    // nowhere.
     constexpr std::string_view kTargets[] = {"x", "y", "z", "nx", "ny", "nz"};
     const ColorProperties color = color_properties(element);
     std::vector<int> targets;
@@ -139,21 +158,23 @@ class PlyReader {
       }
       if (target >= 0) seen |= 1 << target;
       if (const int component = color.component(k); color.there() && component >= 0) target = 6 + component;
+      if (const int place = texcoord_of(property); place >= 0) target = 10 + place;
       targets.push_back(target);
     }
     note_unread(element, [&](size_t k) { return targets[k] >= 0; });
+    const bool placed = std::ranges::count(targets, 10) > 0 && std::ranges::count(targets, 11) > 0;
     if (element.count > 0 && (seen & 7) != 7) fail(file_, "has vertices without x, y and z");
     if (element.count >= kNoIndex - soup_.positions.size()) {
       throw Failure(Exit::kLimit, file_, "holds more than 2^32 - 2 vertices, split the mesh");
     }
     builder_.budget().charge(file_, element.count,
                              sizeof(glm::dvec3) + (has_normals_ ? sizeof(glm::vec3) : 0) +
-                                 (color.there() ? sizeof(glm::vec3) : 0));
+                                 (color.there() ? sizeof(glm::vec3) : 0) + (placed ? sizeof(glm::dvec2) : 0));
     soup_.positions.reserve(soup_.positions.size() + element.count);
     if (has_normals_) soup_.normals.reserve(soup_.normals.size() + element.count);
     const size_t count = element.properties.size();
     for (uint64_t i = 0; i < element.count; ++i) {
-      double values[10] = {0, 0, 0, 0, 0, 0, 0, 0, 0, color.scale};
+      double values[12] = {0, 0, 0, 0, 0, 0, 0, 0, 0, color.scale, 0, 0};
       for (size_t k = 0; k < count; ++k) {
         if (targets[k] < 0) {
           body_.skip(element.properties[k]);
@@ -164,62 +185,150 @@ class PlyReader {
       body_.end_element();
       soup_.positions.push_back({values[0], values[1], values[2]});
       if (has_normals_) soup_.normals.push_back(glm::vec3(values[3], values[4], values[5]));
+      if (placed) {
+        soup_.texcoords.resize(soup_.positions.size() - 1);
+        soup_.texcoords.push_back(from_upper_left(values[10], values[11]));
+        vertices_placed_ = true;
+      }
       if (!color.there()) continue;
       soup_.colors.resize(soup_.positions.size() - 1, kNoColor);
       soup_.colors.push_back(scaled_color({values[6], values[7], values[8], values[9]}, color.scale));
     }
   }
 
-  void read_faces(const Element& element, bool strips) {
-    size_t list = element.properties.size();
-    for (size_t k = 0; k < element.properties.size(); ++k) {
-      const Property& property = element.properties[k];
-      if (property.is_list && (equals_ignoring_case(property.name, "vertex_indices") ||
-                               equals_ignoring_case(property.name, "vertex_index")))
-        list = k;
+  // Which of a face's properties mean something.
+  struct FaceProperties {
+    size_t corners, texcoords, texture;  // the element's number of properties: not there
+    ColorProperties color;
+    bool holds(size_t k) const {
+      return k == corners || k == texcoords || k == texture || (color.there() && color.component(k) >= 0);
     }
-    const ColorProperties color = color_properties(element);
-    note_unread(element, [&](size_t k) { return k == list || (color.there() && color.component(k) >= 0); });
-    if (list == element.properties.size()) return skip(element);
+  };
+
+  FaceProperties face_properties(const Element& element) const {
+    const size_t none = element.properties.size();
+    FaceProperties out{none, none, none, color_properties(element)};
+    for (size_t k = 0; k < none; ++k) {
+      const Property& property = element.properties[k];
+      const auto is = [&](std::string_view name) { return equals_ignoring_case(property.name, name); };
+      if (property.is_list && (is("vertex_indices") || is("vertex_index"))) out.corners = k;
+      if (textured_ && property.is_list && is("texcoord")) out.texcoords = k;
+      if (textured_ && !property.is_list && is("texnumber")) out.texture = k;
+    }
+    return out;
+  }
+
+  void read_faces(const Element& element, bool strips) {
+    const FaceProperties properties = face_properties(element);
+    note_unread(element, [&](size_t k) { return properties.holds(k); });
+    if (properties.corners == element.properties.size()) return skip(element);
+    const ColorProperties& color = properties.color;
     std::vector<uint32_t> strip;
+    std::vector<double> texcoords;
     for (uint64_t i = 0; i < element.count; ++i) {
       glm::dvec4 rgba(0, 0, 0, color.scale);
+      const size_t first = soup_.corners.size();
+      uint32_t texture = 0;
+      texcoords.clear();
       for (size_t k = 0; k < element.properties.size(); ++k) {
         const Property& property = element.properties[k];
         if (const int component = color.component(k); color.there() && component >= 0) {
           rgba[component] = body_.number(property.type);
-          continue;
-        }
-        if (k != list) {
-          body_.skip(property);
-          continue;
-        }
-        const uint64_t length = body_.list_length(property);
-        strip.clear();
-        for (uint64_t c = 0; c < length; ++c) {
-          const int64_t index = body_.index(property.type);
-          if (strips && index < 0) {
-            end_strip(strip);
-            continue;
-          }
-          const uint32_t corner = index >= 0 && index < int64_t{kNoIndex} ? uint32_t(index) : kNoIndex;
-          if (strips) {
-            push(strip, corner);
-          } else {
-            add_corner(corner);
-          }
-        }
-        if (strips) {
-          end_strip(strip);
+        } else if (k == properties.corners) {
+          read_corners(property, strips, strip);
+        } else if (k == properties.texcoords) {
+          const uint64_t length = body_.list_length(property);
+          for (uint64_t c = 0; c < length; ++c) push(texcoords, body_.number(property.type));
+        } else if (k == properties.texture) {
+          const int64_t number = body_.index(property.type);
+          texture = number >= 0 && number < int64_t{kNoIndex} ? uint32_t(number) : kNoIndex;
         } else {
-          soup_.end_face(file_, builder_.budget());
+          body_.skip(property);
         }
       }
       body_.end_element();
+      if (strips) {
+        end_strip(strip);
+      } else {
+        if (texcoords.size() == 2 * (soup_.corners.size() - first)) place_corners(first, texcoords);
+        soup_.end_face(file_, builder_.budget());
+      }
+      if (textured_) {
+        while (soup_.materials.size() < soup_.face_ends.size()) push(soup_.materials, texture);
+      }
       if (!color.there()) continue;
       soup_.face_colors.resize(std::min(soup_.face_colors.size(), soup_.face_ends.size()));
       const glm::vec3 own = scaled_color(rgba, color.scale);
       while (soup_.face_colors.size() < soup_.face_ends.size()) push(soup_.face_colors, own);
+    }
+  }
+
+  void read_corners(const Property& property, bool strips, std::vector<uint32_t>& strip) {
+    const uint64_t length = body_.list_length(property);
+    strip.clear();
+    for (uint64_t c = 0; c < length; ++c) {
+      const int64_t index = body_.index(property.type);
+      if (strips && index < 0) {
+        end_strip(strip);
+        continue;
+      }
+      const uint32_t corner = index >= 0 && index < int64_t{kNoIndex} ? uint32_t(index) : kNoIndex;
+      if (strips) {
+        push(strip, corner);
+      } else {
+        add_corner(corner);
+      }
+    }
+  }
+
+  // Texture coordinates of a face's own, for its corners from `first` on.
+  void place_corners(size_t first, const std::vector<double>& texcoords) {
+    fill_up_texcoords();
+    for (size_t c = first; c < soup_.corners.size(); ++c) {
+      soup_.corner_texcoords[c] = uint32_t(soup_.texcoords.size());
+      const double* uv = &texcoords[2 * (c - first)];
+      push(soup_.texcoords, from_upper_left(uv[0], uv[1]));
+    }
+  }
+
+  void fill_up_texcoords() {
+    while (soup_.corner_texcoords.size() < soup_.corners.size()) push(soup_.corner_texcoords, kNoIndex);
+  }
+
+  // Makes materials of textures, and of the numbers that faces carry the materials'.
+  void use_textures(const std::vector<std::string>& names) {
+    if (names.empty()) return;
+    if (soup_.corner_texcoords.empty()) {
+      for (const std::string& name : names)
+        builder_.note(file_ + ": the texture " + name + " is not read, there are no coordinates for it");
+      soup_.materials.clear();
+      return;
+    }
+    fill_up_texcoords();
+    MtlTextures textures(file_, builder_);
+    std::vector<uint32_t> materials;
+    constexpr size_t kMostTextures =
+        1000;  // a hostile header may name the same large file thousands of times
+    for (const std::string& name : std::span(names).first(std::min(names.size(), kMostTextures))) {
+      MtlMaterial source;
+      source.material.name = name;
+      source.material.base_color = glm::vec3(1);
+      source.color.file = name;
+      source.folder = folder_;
+      const uint32_t material = textures.add(source, soup_.surfaces);
+      materials.push_back(soup_.surfaces.contains(material) ? material : soup_.material);
+    }
+    bool without = false;
+    for (uint32_t& material : soup_.materials) {
+      without = without || material >= materials.size();
+      material = material < materials.size() ? materials[material] : soup_.material;
+    }
+    if (without)
+      builder_.note(file_ + ": faces have a texture's number that no comment names, they are grey");
+    if (!soup_.surfaces.empty() && (!soup_.colors.empty() || !soup_.face_colors.empty())) {
+      builder_.note(file_ + ": colours of vertices or faces are not read, textures say them");
+      soup_.colors.clear();
+      soup_.face_colors.clear();
     }
   }
 
@@ -231,6 +340,9 @@ class PlyReader {
   void add_corner(uint32_t corner) {
     push(soup_.corners, corner);
     if (has_normals_) push(soup_.corner_normals, corner);
+    if (!vertices_placed_) return;
+    while (soup_.corner_texcoords.size() + 1 < soup_.corners.size()) push(soup_.corner_texcoords, kNoIndex);
+    push(soup_.corner_texcoords, corner);
   }
 
   // A strip's triangle k is (k, k+1, k+2), every second one turned round.
@@ -244,12 +356,15 @@ class PlyReader {
     strip.clear();
   }
 
+  const std::filesystem::path folder_;
   const std::string& file_;
   Body& body_;
   MeshBuilder& builder_;
   PolygonSoup soup_;
   bool has_normals_ = false;
   bool translucent_ = false;
+  bool textured_ = false;         // comments name textures
+  bool vertices_placed_ = false;  // texture coordinates are the vertices'
 };
 
 }  // namespace
@@ -260,7 +375,7 @@ void read_ply(const std::filesystem::path& path, MeshBuilder& builder) {
   std::string_view text = bytes;
   const ply::Header header = ply::read_header(file, text);
   ply::Body body(file, text, header.encoding);
-  PlyReader(file, body, builder).read(header);
+  PlyReader(path, file, body, builder).read(header);
 }
 
 }  // namespace lsp

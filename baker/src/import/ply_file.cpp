@@ -38,7 +38,7 @@ Header read_header(const std::string& file, std::string_view& text) {
   while (take_line(text, line)) {
     if (!take_word(line, word) || word == "obj_info") continue;
     if (word == "comment") {
-      if (take_word(line, word) && word == "TextureFile") header.textures.insert(std::string(trim(line)));
+      if (take_word(line, word) && word == "TextureFile") header.textures.emplace_back(unquoted(trim(line)));
       continue;
     }
     if (word == "end_header") {

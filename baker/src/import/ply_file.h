@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
-#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -52,7 +51,7 @@ inline size_t size_of(Type type) {
 struct Header {
   Encoding encoding = Encoding::kAscii;
   std::vector<Element> elements;
-  std::set<std::string> textures;  // named by comments, as some programs do
+  std::vector<std::string> textures;  // named by comments, as some programs do; faces count them from 0
 };
 
 // Takes the header off `text`. Throws Failure kInvalid, kUnsupported (a format PLY does not know).

@@ -23,20 +23,43 @@ uint32_t binary_count(std::string_view bytes) {
   return count;
 }
 
-// Whether this is text. Binary headers may start with "solid" too; no line behind them then starts with a
-// facet, or the end of the solid.
+bool is_comment(std::string_view word) {
+  return word.front() == '#' || word.front() == ';' || word.front() == '!' || word.starts_with("//");
+}
+
+// What follows the first "facet normal", which stands behind a solid's name where the whole file is one line;
+// empty where there is none.
+std::string_view from_facet(std::string_view line) {
+  std::string_view word;
+  for (bool facet = false; take_word(line, word); facet = equals_ignoring_case(word, "facet")) {
+    if (facet && equals_ignoring_case(word, "normal")) return line;
+  }
+  return {};
+}
+
+// Whether this is text. Binary headers may start with "solid" too; behind them then no line starts with a
+// facet, or the end of the solid, and none holds a facet's vertices.
 bool looks_ascii(std::string_view bytes) {
   constexpr size_t kLook = 65536;
   std::string_view rest = bytes.substr(0, kLook), line, word;
-  bool first = true;
+  bool first = true, in_facet = false;
   while (take_line(rest, line)) {
     if (!take_word(line, word)) continue;
+    if (is_comment(word)) continue;
     const bool keyword = equals_ignoring_case(word, "facet") || equals_ignoring_case(word, "endsolid");
-    if (keyword && word.data() >= bytes.data() + std::min(bytes.size(), kHeaderBytes)) return true;
+    const char* body = bytes.data() + std::min(bytes.size(), kHeaderBytes);
+    if (keyword && word.data() >= body) return true;
     if (first && !keyword && !equals_ignoring_case(word, "solid")) return false;
     first = false;
+    // One line may hold the whole file.
+    if (!in_facet) line = from_facet(line);
+    in_facet = in_facet || !line.empty();
+    while (take_word(line, word)) {
+      const bool within = equals_ignoring_case(word, "vertex") || equals_ignoring_case(word, "endfacet");
+      if (within && word.data() >= body) return true;
+    }
   }
-  return !first && bytes.size() < kHeaderBytes;
+  return !first && bytes.size() < kHeaderBytes + kTriangleBytes;
 }
 
 // What bytes read as a triangle hold: anything else than triangles will look like noise.
@@ -111,32 +134,43 @@ void read_binary(const std::string& file, std::string_view bytes, uint32_t count
     builder.note(file + ": attribute bytes of triangles (colours, in some programs) are not read");
 }
 
-glm::dvec3 read_vector(std::string_view line) {
+glm::dvec3 read_vector(std::string_view& line) {
   glm::dvec3 vector(std::numeric_limits<double>::quiet_NaN());
   std::string_view word;
   for (int i = 0; i < 3 && take_word(line, word); ++i) vector[i] = number_of(word);
   return vector;
 }
 
-// Keywords at the start of lines, in any case: any number of solids, their names free text. A loop with more
-// than three vertices is taken as a polygon.
+// Keywords in any case, one or more a line: any number of solids, their names free text to the end of the
+// line or to a facet. A line that starts with another word is passed over. A loop with more than three
+// vertices is taken as a polygon.
 void read_ascii(const std::string& file, std::string_view text, PolygonSoup& soup, MeshBuilder& builder) {
   Budget& budget = builder.budget();
   std::string_view line, word;
   uint32_t normal = kNoIndex;
+  const auto start_facet = [&] {
+    normal = uint32_t(soup.normals.size());
+    budget.push_back(file, soup.normals, glm::vec3(read_vector(line)));
+  };
   while (take_line(text, line)) {
-    if (!take_word(line, word)) continue;
-    if (equals_ignoring_case(word, "vertex")) {
-      budget.push_back(file, soup.corners, uint32_t(soup.positions.size()));
-      budget.push_back(file, soup.positions, read_vector(line));
-      budget.push_back(file, soup.corner_normals, normal);
-    } else if (equals_ignoring_case(word, "facet")) {
-      normal = uint32_t(soup.normals.size());
-      take_word(line, word);  // "normal"
-      budget.push_back(file, soup.normals, glm::vec3(read_vector(line)));
-    } else if (equals_ignoring_case(word, "endfacet")) {
-      soup.end_face(file, budget);
-      normal = kNoIndex;
+    while (take_word(line, word)) {
+      const auto is = [&](std::string_view keyword) { return equals_ignoring_case(word, keyword); };
+      if (is("vertex")) {
+        budget.push_back(file, soup.corners, uint32_t(soup.positions.size()));
+        budget.push_back(file, soup.positions, read_vector(line));
+        budget.push_back(file, soup.corner_normals, normal);
+      } else if (is("facet")) {
+        take_word(line, word);  // "normal"
+        start_facet();
+      } else if (is("endfacet")) {
+        soup.end_face(file, budget);
+        normal = kNoIndex;
+      } else if (is("solid") || is("endsolid")) {
+        line = from_facet(line);
+        if (!line.empty()) start_facet();
+      } else if (!is("outer") && !is("loop") && !is("endloop")) {
+        break;
+      }
     }
   }
   if (soup.corners.size() != (soup.face_ends.empty() ? 0 : soup.face_ends.back())) {
