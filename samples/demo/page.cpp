@@ -160,10 +160,16 @@ std::string curve(const Figures& f) {
 // The qualities side by side; nothing where there is but one.
 std::string dial(const Figures& f) {
   if (f.others.empty() || !has_tables(f)) return "";
+  const bool lights = f.approximate.value("light_quality", "") == "fast";
   std::string html =
       "<h2>The dial</h2>\n<p>The same file at other qualities: where tables lose more than the quality "
       "allows, a cell "
-      "is traced exactly. fast is tables alone.</p>\n<table><thead><tr><th>quality</th><th>rays a second, "
+      "is traced exactly. fast is tables alone" +
+      std::string(lights
+                      ? ", and so are in all of them the rays to lights from where others land, whose errors "
+                        "show least (<code>--light-quality fast</code>)"
+                      : "") +
+      ".</p>\n<table><thead><tr><th>quality</th><th>rays a second, "
       "times "
       "exact</th><th>mean error</th><th>pixels that differ visibly</th></tr></thead>\n";
   const auto add = [&](const std::string& name, const nlohmann::json& approximate,
