@@ -150,7 +150,11 @@ class InstanceBatch {
         mask_(mask & 0xFF),
         counting_(counting),
         memory_(memory),
-        trace_asset_(trace) {}
+        trace_asset_(trace) {
+    // Hits are told apart by their primitives here.
+    if ((options_.flags & LSP_TRACE_OCCLUSION) == 0) return;
+    options_.flags = (options_.flags & ~LSP_TRACE_OCCLUSION) | LSP_TRACE_ANY_HIT;
+  }
 
   // Traces rays[0, count), at most kLargestInstanceBatch and as many as the memory is for. False: an asset
   // cannot be traced.
@@ -259,7 +263,7 @@ class InstanceBatch {
   }
 
   const lsp_instances& instances_;
-  const lsp_trace_options& options_;
+  lsp_trace_options options_;
   const uint32_t mask_;
   const bool counting_;
   Memory& memory_;

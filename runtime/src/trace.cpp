@@ -46,7 +46,9 @@ extern "C" float lsp_hit_offset(const lsp_scene* scene, const LspHit* hit) {
 }
 
 lsp_status lsp::check_options(const lsp_trace_options& options, lsp_error* error) {
-  if (const uint32_t unknown = options.flags & ~(LSP_TRACE_ALL_FLAGS | LSP_TRACE_MAX_LOSS); unknown != 0)
+  if (const uint32_t unknown =
+          options.flags & ~(LSP_TRACE_ALL_FLAGS | LSP_TRACE_MAX_LOSS | LSP_TRACE_OCCLUSION);
+      unknown != 0)
     return fail(error, LSP_ERROR_UNSUPPORTED, 0,
                 "library version %s does not know trace flags 0x%x: leave them out or link a newer one",
                 LSP_LIBRARY_VERSION_STRING, unknown);
@@ -71,26 +73,26 @@ extern "C" lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options*
   const uint32_t features = scene->header->required_features;
   const bool approximate = lsp::is_approximate(*scene, *options);
   const bool partial = (features & LSP_FEATURE_COVERAGE) != 0;
+  uint32_t flags = options->flags;
+  if ((flags & LSP_TRACE_OCCLUSION) != 0) flags |= LSP_TRACE_ANY_HIT;
+  const bool any_hit = (flags & LSP_TRACE_ANY_HIT) != 0;
   if (approximate && (features & LSP_FEATURE_CELLS) != 0) {
 #ifdef LSP_SIMD
     const bool wide = !partial && counts == nullptr && count >= lsp::kFewRays;
     if (const lsp::WideCells* loop = wide ? lsp::wide_cells(*scene) : nullptr; loop != nullptr) {
-      loop->trace(*scene, (options->flags & LSP_TRACE_ANY_HIT) != 0, lsp_dial(scene, options), rays, hits,
-                  count);
+      loop->trace(*scene, flags, lsp_dial(scene, options), rays, hits, count);
       return LSP_OK;
     }
 #endif
     lsp::TraceCells& trace = partial ? lsp::partial::trace_cells : lsp::solid::trace_cells;
-    trace(*scene, (options->flags & LSP_TRACE_ANY_HIT) != 0, lsp_dial(scene, options), rays, hits, count,
-          counts);
+    trace(*scene, any_hit, lsp_dial(scene, options), rays, hits, count, counts);
     return LSP_OK;
   }
   if ((features & LSP_FEATURE_WIDE) != 0) {
-    const bool any_hit = (options->flags & LSP_TRACE_ANY_HIT) != 0;
 #ifdef LSP_SIMD
     if (const lsp::WideExact* loop = !partial && counts == nullptr ? lsp::wide_exact() : nullptr;
         loop != nullptr) {
-      loop->trace(*scene, any_hit, rays, hits, count);
+      loop->trace(*scene, flags, rays, hits, count);
       return LSP_OK;
     }
 #endif
@@ -98,7 +100,7 @@ extern "C" lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options*
     loops.of[any_hit ? 1 : 0](*scene, 0, rays, hits, count, counts);
     return LSP_OK;
   }
-  uint32_t flags = options->flags & (approximate ? LSP_TRACE_ALL_FLAGS : LSP_TRACE_ANY_HIT);
+  flags &= approximate ? LSP_TRACE_ALL_FLAGS : LSP_TRACE_ANY_HIT;
   if (flags & LSP_TRACE_NEAR_APPROXIMATE) flags &= ~LSP_TRACE_NEAR_SKIP;
   const bool ntree = scene->header->base_structure == LSP_BASE_NTREE;
   const lsp::TraceLoops& loops = partial ? (ntree ? lsp::partial::kNTreeLoops : lsp::partial::kBvhLoops)

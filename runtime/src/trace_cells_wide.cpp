@@ -49,6 +49,7 @@ struct Tracer {
   LspHit* hits;
   const uint32_t count;
   const uint32_t dial;
+  const uint32_t flags;
   const bool any_hit;
   Arrays arrays;
 
@@ -72,7 +73,7 @@ struct Tracer {
   size_t found_count = 0;
   ExactTrace turns[kTurns];
 
-  Tracer(const lsp_scene& scene, bool any_hit, uint32_t dial, const LspRay* rays, LspHit* hits,
+  Tracer(const lsp_scene& scene, uint32_t flags, uint32_t dial, const LspRay* rays, LspHit* hits,
          uint32_t count)
       : scene(scene),
         grid(scene.header->cells),
@@ -80,7 +81,8 @@ struct Tracer {
         hits(hits),
         count(count),
         dial(dial),
-        any_hit(any_hit),
+        flags(flags),
+        any_hit((flags & LSP_TRACE_ANY_HIT) != 0),
         arrays{or_zero(scene.filled_cells, scene.header->filled_cell_count),
                or_zero(scene.planes, scene.header->plane_count),
                or_zero(scene.splits, scene.header->split_count),
@@ -531,7 +533,7 @@ struct Tracer {
   void finish() {
     for (size_t k = 0; k < found_count; ++k) {
       const LspRay& of = rays[found[k].ray];
-      hits[found[k].ray] = Text::lsp_finish(scene, Text::lsp_setup(scene, of), of, found[k].best);
+      hits[found[k].ray] = Text::lsp_finish(scene, Text::lsp_setup(scene, of), of, found[k].best, flags);
     }
     found_count = 0;
   }
@@ -596,12 +598,12 @@ struct Tracer {
   }
 };
 
-void trace(const lsp_scene& scene, bool any_hit, uint32_t dial, const LspRay* rays, LspHit* hits,
+void trace(const lsp_scene& scene, uint32_t flags, uint32_t dial, const LspRay* rays, LspHit* hits,
            uint64_t count) {
   constexpr uint64_t kAtOnce = 1u << 30;  // numbers of rays have 32 bits
   for (uint64_t first = 0; first < count; first += kAtOnce) {
     const uint64_t rest = count - first;
-    Tracer tracer(scene, any_hit, dial, rays + first, hits + first,
+    Tracer tracer(scene, flags, dial, rays + first, hits + first,
                   static_cast<uint32_t>(rest < kAtOnce ? rest : kAtOnce));
     static_assert(sizeof tracer <= 20 * 1024);  // of the stack, as lsp/lsp.h says
     tracer.run();

@@ -9,7 +9,7 @@ namespace lsp {
 struct WideCells {
   const char* name;
   bool (*runs_here)();  // on this CPU
-  void (*trace)(const lsp_scene& scene, bool any_hit, uint32_t dial, const LspRay* rays, LspHit* hits,
+  void (*trace)(const lsp_scene& scene, uint32_t flags, uint32_t dial, const LspRay* rays, LspHit* hits,
                 uint64_t count);
 };
 

@@ -139,7 +139,7 @@ LSP_CLONES void trace_group(const lsp_scene& scene, float lod, const LspRay* ray
     add(counts, traced);
   };
   const auto end = [&](Ray& r) LSP_INLINE {
-    finish({Traversal::lsp_finish(scene, r.s, rays[r.ray], r.lsp_end(scene)), r.lsp_walk.counts, true},
+    finish({Traversal::lsp_finish(scene, r.s, rays[r.ray], r.lsp_end(scene), 0), r.lsp_walk.counts, true},
            r.ray);
   };
   // The next ray that has something to visit.

@@ -144,13 +144,13 @@ class Tracer {
         tame_(is_tame(lsp_vec3(scene.header->bounds_min)) && is_tame(lsp_vec3(scene.header->bounds_max))) {}
 
   template <bool kAny>
-  HWY_INLINE LspHit trace(const LspRay& ray) {
+  HWY_INLINE LspHit trace(const LspRay& ray, uint32_t flags) {
     const Text::LspSetup s = Text::lsp_setup(scene_, ray);
     if (!s.valid) return Text::lsp_no_hit();
     if (!tame_ || !is_tame(s.origin)) return trace_singly<kAny>(s, ray);
     Text::LspBest best = Text::lsp_no_best(s);
     best.complete = node_count_ == 0 || walk<kAny>(s, best);
-    return Text::lsp_finish(scene_, s, ray, best);
+    return Text::lsp_finish(scene_, s, ray, best, flags);
   }
 
  private:
@@ -393,13 +393,13 @@ class Tracer {
   Waiting stack_[kStack];
 };
 
-void trace(const lsp_scene& scene, bool any_hit, const LspRay* rays, LspHit* hits, uint64_t count) {
+void trace(const lsp_scene& scene, uint32_t flags, const LspRay* rays, LspHit* hits, uint64_t count) {
   Tracer tracer(scene);
   static_assert(sizeof tracer <= 20 * 1024);  // of the stack, as lsp/lsp.h says
-  if (any_hit)
-    for (uint64_t i = 0; i < count; ++i) hits[i] = tracer.trace<true>(rays[i]);
+  if ((flags & LSP_TRACE_ANY_HIT) != 0)
+    for (uint64_t i = 0; i < count; ++i) hits[i] = tracer.trace<true>(rays[i], flags);
   else
-    for (uint64_t i = 0; i < count; ++i) hits[i] = tracer.trace<false>(rays[i]);
+    for (uint64_t i = 0; i < count; ++i) hits[i] = tracer.trace<false>(rays[i], flags);
 }
 
 }  // namespace

@@ -9,7 +9,7 @@ namespace lsp {
 struct WideExact {
   const char* name;
   bool (*runs_here)();  // on this CPU
-  void (*trace)(const lsp_scene& scene, bool any_hit, const LspRay* rays, LspHit* hits, uint64_t count);
+  void (*trace)(const lsp_scene& scene, uint32_t flags, const LspRay* rays, LspHit* hits, uint64_t count);
 };
 
 // All that are compiled in, the best first, and a last one whose name is null.

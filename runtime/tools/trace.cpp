@@ -49,8 +49,11 @@ void define(CLI::App& app, Options& options) {
   app.add_option("--mode", options.mode,
                  "Down to triangles or by Line Spaces; without it by Line Spaces if there are any")
       ->check(CLI::IsMember({"exact", "approximate"}));
-  app.add_option("--query", options.query, "The closest hit or any hit")
-      ->check(CLI::IsMember({"closest", "any"}));
+  app.add_option(
+         "--query", options.query,
+         "The closest hit, any hit, or no more than whether there is one: then only t says something, "
+         "finite where there is (default closest)")
+      ->check(CLI::IsMember({"closest", "any", "occlusion"}));
   add_trace_arguments(app, options.trace);
   app.add_option("--repeat", options.repeats, "Times to trace all rays")->check(CLI::Range(1u, 1000000u));
   app.add_option("--threads", options.threads, "Threads of the CPU backend; all without it")
@@ -127,6 +130,7 @@ TraceRequest make_request(const Options& options, const Scene& scene) {
   const bool approximate = options.mode.empty() ? line_spaces : options.mode == "approximate";
   request.options = to_trace_options(options.trace, approximate);
   if (options.query == "any") request.options.flags |= LSP_TRACE_ANY_HIT;
+  if (options.query == "occlusion") request.options.flags |= LSP_TRACE_OCCLUSION;
   request.vulkan = options.backend == "vulkan";
   request.repeats = options.repeats;
   request.threads = options.threads;

@@ -46,7 +46,7 @@ void main() {
 #ifdef LSP_COUNT
   if ((hit.flags & LSP_HIT_INCOMPLETE) == 0u) {  // an incomplete ray is traced, and counted, again
     add(LSP_COUNTER_INVALID, traced.valid ? 0u : 1u);
-    add(LSP_COUNTER_HITS, hit.primitive != LSP_NONE ? 1u : 0u);
+    add(LSP_COUNTER_HITS, hit.t < LSP_INFINITY ? 1u : 0u);
     add(LSP_COUNTER_NODES, traced.counts.nodes);
     add(LSP_COUNTER_SHAFTS, traced.counts.shafts);
     add(LSP_COUNTER_TRIANGLES, traced.counts.triangles);

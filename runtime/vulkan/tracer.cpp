@@ -459,13 +459,15 @@ VulkanTrace VulkanTracer::Impl::trace(const lsp_trace_options& wanted, std::span
   const Loaded& scene = loaded[number];
   // Flags that have no meaning together make no pipeline of their own.
   lsp_trace_options options = wanted;
-  options.flags &= (wanted.flags & LSP_TRACE_APPROXIMATE) != 0 ? LSP_TRACE_ALL_FLAGS : LSP_TRACE_ANY_HIT;
+  constexpr uint32_t kAny = LSP_TRACE_ANY_HIT | LSP_TRACE_OCCLUSION;
+  options.flags &= (wanted.flags & LSP_TRACE_APPROXIMATE) != 0 ? LSP_TRACE_ALL_FLAGS | kAny : kAny;
+  if ((options.flags & LSP_TRACE_OCCLUSION) != 0) options.flags |= LSP_TRACE_ANY_HIT;
   if ((options.flags & LSP_TRACE_NEAR_APPROXIMATE) != 0) options.flags &= ~LSP_TRACE_NEAR_SKIP;
   dial_ = 0;
   // Wide nodes alone answer every ray exactly: the same pipeline.
-  if (scene.scene.header->base_structure == LSP_BASE_WIDE) options.flags &= LSP_TRACE_ANY_HIT;
+  if (scene.scene.header->base_structure == LSP_BASE_WIDE) options.flags &= kAny;
   if ((scene.scene.header->required_features & LSP_FEATURE_CELLS) != 0) {
-    options.flags &= LSP_TRACE_APPROXIMATE | LSP_TRACE_ANY_HIT;
+    options.flags &= LSP_TRACE_APPROXIMATE | kAny;
     if ((options.flags & LSP_TRACE_APPROXIMATE) != 0) dial_ = lsp_dial(&scene.scene, &wanted);
   }
   const auto start = std::chrono::steady_clock::now();

@@ -600,7 +600,7 @@ class Renderer {
 
   void trace_light(lsp_trace_options options, bool indirect) {
     hits_.resize(rays_.size());
-    options.flags |= LSP_TRACE_ANY_HIT;
+    options.flags |= LSP_TRACE_OCCLUSION;
     const double seconds = tracer_.trace(options, rays_, hits_);
     (indirect ? report_.indirect_rays : report_.shadow_rays) += rays_.size();
     (indirect ? report_.indirect_seconds : report_.shadow_seconds) += seconds;

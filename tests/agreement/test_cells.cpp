@@ -343,6 +343,15 @@ TEST_P(CellsOnVulkan, SameBits) {
       EXPECT_EQ(traced.counts.splits, counts.splits);
       EXPECT_EQ(traced.counts.exact, counts.exact);
       EXPECT_EQ(traced.counts.triangles, counts.triangles);
+      if ((options.flags & LSP_TRACE_ANY_HIT) == 0) continue;
+      lsp_trace_options occlusion = options;
+      occlusion.flags = (options.flags & ~LSP_TRACE_ANY_HIT) | LSP_TRACE_OCCLUSION;
+      EXPECT_EQ(tracer.trace(occlusion, rays, gpu, true).counts.hits, counts.hits);
+      const auto asked = trace(file.scene(), occlusion, rays);
+      for (size_t i = 0; i < rays.size(); ++i) {
+        ASSERT_EQ(gpu[i].t, cpu[i].t) << i;
+        ASSERT_EQ(asked[i].t, cpu[i].t) << i;
+      }
     }
   }
   fs::remove(path);

@@ -146,6 +146,14 @@ void expect_same(const std::vector<LspHit>& single, const std::vector<LspHit>& w
 }
 
 // By the number of an instruction set.
+// The same t of any hit, and nothing besides.
+void expect_same_occlusion(const std::vector<LspHit>& single, const std::vector<LspHit>& wide) {
+  for (size_t i = 0; i < single.size(); ++i) {
+    ASSERT_EQ(wide[i].t, single[i].t) << i;
+    ASSERT_EQ(wide[i].primitive, LSP_NONE) << i;
+  }
+}
+
 class WideCellsTest : public testing::TestWithParam<size_t> {
  protected:
   const WideCells& wide_ = kWideCells[GetParam()];
@@ -163,8 +171,12 @@ TEST_P(WideCellsTest, SameBitsAsSingleRays) {
       for (const uint32_t any : {0u, LSP_TRACE_ANY_HIT}) {
         const lsp_trace_options options{LSP_TRACE_APPROXIMATE | LSP_TRACE_MAX_LOSS | any, 0, 0, max_loss};
         const auto single = single_rays(scene, options, rays);
-        wide_.trace(scene, any != 0, lsp_dial(&scene, &options), rays.data(), wide.data(), rays.size());
+        wide_.trace(scene, any, lsp_dial(&scene, &options), rays.data(), wide.data(), rays.size());
         expect_same(single, wide, rays, std::string(of.name) + ", loss " + std::to_string(max_loss));
+        if (any == 0) continue;
+        wide_.trace(scene, any | LSP_TRACE_OCCLUSION, lsp_dial(&scene, &options), rays.data(), wide.data(),
+                    rays.size());
+        expect_same_occlusion(single, wide);
       }
   }
 }
@@ -178,7 +190,7 @@ TEST_P(WideCellsTest, AnyNumberOfRays) {
   for (const size_t count : {0, 1, 2, 3, 5, 8, 15, 17, 63, 64, 65, 129, 1000}) {
     const LspHit untouched{1, 2, 3, 4, {5, 6, 7}, 8};
     std::vector<LspHit> wide(count + 1, untouched);
-    wide_.trace(scene, false, lsp_dial(&scene, &options), rays.data() + 100, wide.data(), count);
+    wide_.trace(scene, 0, lsp_dial(&scene, &options), rays.data() + 100, wide.data(), count);
     EXPECT_EQ(std::memcmp(wide.data(), single.data() + 100, count * sizeof(LspHit)), 0) << count;
     EXPECT_EQ(std::memcmp(&wide[count], &untouched, sizeof(LspHit)), 0) << count;
   }
@@ -220,7 +232,7 @@ TEST_P(WideCellsTest, SameBitsOfDamagedFiles) {
     for (const float max_loss : {100.0f, 2.0f}) {
       const lsp_trace_options options{LSP_TRACE_APPROXIMATE | LSP_TRACE_MAX_LOSS, 0, 0, max_loss};
       const auto single = single_rays(scene, options, rays);
-      wide_.trace(scene, false, lsp_dial(&scene, &options), rays.data(), wide.data(), rays.size());
+      wide_.trace(scene, 0, lsp_dial(&scene, &options), rays.data(), wide.data(), rays.size());
       expect_same(single, wide, rays, "damaged " + std::to_string(round));
     }
   }
@@ -247,8 +259,11 @@ TEST_P(WideExactTest, SameBitsAsSingleRays) {
                               [](const LspHit& h) { return h.primitive != LSP_NONE; }),
                 500)
           << of.name;
-      wide_.trace(scene, any != 0, rays.data(), wide.data(), rays.size());
+      wide_.trace(scene, any, rays.data(), wide.data(), rays.size());
       expect_same(single, wide, rays, std::string(of.name) + ", any " + std::to_string(any));
+      if (any == 0) continue;
+      wide_.trace(scene, any | LSP_TRACE_OCCLUSION, rays.data(), wide.data(), rays.size());
+      expect_same_occlusion(single, wide);
     }
   }
 }
@@ -263,7 +278,7 @@ TEST_P(WideExactTest, SameBitsInHugeScenes) {
     const std::vector<LspRay> rays = rays_of(baked);
     std::vector<LspHit> wide(rays.size());
     const auto single = single_rays(scene, {0, 0, 0, 0}, rays);
-    wide_.trace(scene, false, rays.data(), wide.data(), rays.size());
+    wide_.trace(scene, 0, rays.data(), wide.data(), rays.size());
     expect_same(single, wide, rays, "scaled by " + std::to_string(scale));
   }
 }

@@ -43,13 +43,13 @@ TEST(Interface, RefusesOptionsThatItDoesNotKnow) {
   const auto trace = [&](const lsp_trace_options& options) {
     return lsp_trace(&scene, &options, &ray, &hit, 1, &counts, &error);
   };
-  EXPECT_EQ(trace({LSP_TRACE_APPROXIMATE | 0x20u, 0}), LSP_ERROR_UNSUPPORTED);
-  EXPECT_NE(std::string(error.message).find("flags 0x20"), std::string::npos) << error.message;
+  EXPECT_EQ(trace({LSP_TRACE_APPROXIMATE | 0x40u, 0}), LSP_ERROR_UNSUPPORTED);
+  EXPECT_NE(std::string(error.message).find("flags 0x40"), std::string::npos) << error.message;
   EXPECT_EQ(trace({0, 0, LSP_QUALITY_COUNT}), LSP_ERROR_UNSUPPORTED);
   EXPECT_NE(std::string(error.message).find("quality 3"), std::string::npos) << error.message;
   EXPECT_EQ(hit.primitive, 77u) << "nothing is traced";
   EXPECT_EQ(counts.rays, 0u);
-  EXPECT_EQ(trace({LSP_TRACE_ALL_FLAGS | LSP_TRACE_MAX_LOSS, 0, LSP_QUALITY_ACCURATE, 5}), LSP_OK);
+  EXPECT_EQ(trace({LSP_TRACE_ALL_FLAGS | LSP_TRACE_MAX_LOSS | LSP_TRACE_OCCLUSION, 0, LSP_QUALITY_ACCURATE, 5}), LSP_OK);
   EXPECT_EQ(counts.rays, 1u);
 }
 

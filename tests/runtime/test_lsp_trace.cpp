@@ -88,6 +88,7 @@ TEST_F(LspTrace, WritesTheLibrarysHits) {
       {"", LSP_TRACE_APPROXIMATE},
       {"--mode exact", 0},
       {"--mode exact --query any", LSP_TRACE_ANY_HIT},
+      {"--mode exact --query occlusion", LSP_TRACE_OCCLUSION},
       {"--mode approximate --near approximate", LSP_TRACE_APPROXIMATE | LSP_TRACE_NEAR_APPROXIMATE},
       {"--mode approximate --near skip", LSP_TRACE_APPROXIMATE | LSP_TRACE_NEAR_SKIP},
       {"--mode exact --threads 3", 0},

@@ -50,10 +50,14 @@ LSP_END(LspHit)
  * the origin for a small error; ignored with LSP_TRACE_NEAR_APPROXIMATE. */
 #define LSP_TRACE_NEAR_SKIP 0x8u
 
-#define LSP_TRACE_ALL_FLAGS 0xFu /* that a traversal knows */
+#define LSP_TRACE_ALL_FLAGS 0xFu /* that change the way of a traversal */
 
 /* lsp_trace_options.max_loss sets the dial, not its quality. */
 #define LSP_TRACE_MAX_LOSS 0x10u
+
+/* Any hit, and no more is asked than whether there is one: hit.t is finite then, the rest of the hit says nothing (it
+ * may be filled or not). Saves a look-up of triangle and normals. */
+#define LSP_TRACE_OCCLUSION 0x20u
 
 /* ---- the trace shader ---------------------------------------------------------------------------------- */
 

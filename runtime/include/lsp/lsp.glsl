@@ -11,6 +11,7 @@
  *   #include "lsp/lsp.glsl"
  *
  *   LspHit hit = lsp_trace(lsp_bound_scene(), ray, LSP_TRACE_APPROXIMATE, 0.0);
+ *   bool shadowed = lsp_occluded(lsp_bound_scene(), ray, LSP_TRACE_APPROXIMATE, 0.0, dial);
  *
  * Cells take the dial, what lsp_dial of lsp/lsp.h answers, as one argument more.
  *
@@ -122,6 +123,11 @@ vec3 lsp_float3_of(vec3 v) { return v; }
 /* flags: LSP_TRACE_*; lod: stop at a Line Space once its diagonal is under lod * distance, 0: deepest. */
 LspHit lsp_trace(LspScene scene, LspRay ray, uint flags, float lod, uint dial) {
   return lsp_trace_ray(scene, ray, flags, lod, dial).hit;
+}
+
+/* Whether anything lies on the ray: without a look-up of what it is. flags: LSP_TRACE_APPROXIMATE and what goes with it. */
+bool lsp_occluded(LspScene scene, LspRay ray, uint flags, float lod, uint dial) {
+  return lsp_trace(scene, ray, flags | LSP_TRACE_OCCLUSION, lod, dial).t < LSP_INFINITY;
 }
 
 /* With cells: balanced. */

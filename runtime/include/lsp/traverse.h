@@ -636,13 +636,18 @@ LSP_FN LspHit lsp_no_hit() {
   return hit;
 }
 
-/* The answer in the caller's terms: t in lengths of the direction given, unit shading normal. */
-LSP_FN LspHit lsp_finish(LspScene scene, LspSetup s, LspRay ray, LspBest best) {
+/* The answer in the caller's terms: t in lengths of the direction given, unit shading normal. flags: of what is asked,
+ * LSP_TRACE_OCCLUSION counts. */
+LSP_FN LspHit lsp_finish(LspScene scene, LspSetup s, LspRay ray, LspBest best, uint flags) {
   LspHit hit = lsp_no_hit();
   if (!best.complete) hit.flags = LSP_HIT_INCOMPLETE;
   if (best.triangle == LSP_NONE) return hit;
   float t = best.t * s.to_given;
   if (!(t > ray.tmin && t < ray.tmax)) return hit;
+  if ((flags & LSP_TRACE_OCCLUSION) != 0u) {
+    hit.t = t;
+    return hit;
+  }
   LspTriangle tri = lsp_load_triangle(scene, best.triangle);
   vec3 v0 = lsp_vec3(tri.v0);
   vec3 n = lsp_cross(lsp_vec3(tri.v1) - v0, lsp_vec3(tri.v2) - v0);
@@ -715,7 +720,7 @@ LSP_STEP LspTraced lsp_trace_ready(LspScene scene, LspSetup s, LspQuery q, LspRa
     }
   }
   LspTraced traced;
-  traced.hit = lsp_finish(scene, s, ray, lsp_end(scene));
+  traced.hit = lsp_finish(scene, s, ray, lsp_end(scene), q.flags);
   traced.counts = lsp_walk.counts;
   traced.valid = true;
   return traced;
@@ -726,7 +731,7 @@ LSP_STEP LspTraced lsp_trace_ray(LspScene scene, LspRay ray, uint flags, float l
   LspSetup s = lsp_setup(scene, ray);
   if (!s.valid) return lsp_invalid_ray();
   LspQuery q;
-  q.flags = flags;
+  q.flags = (flags & LSP_TRACE_OCCLUSION) != 0u ? flags | LSP_TRACE_ANY_HIT : flags;
   q.lod = lod;
   q.dial = dial;
   q.far = lsp_is_far(scene, s);
