@@ -49,7 +49,9 @@ TEST(Interface, RefusesOptionsThatItDoesNotKnow) {
   EXPECT_NE(std::string(error.message).find("quality 3"), std::string::npos) << error.message;
   EXPECT_EQ(hit.primitive, 77u) << "nothing is traced";
   EXPECT_EQ(counts.rays, 0u);
-  EXPECT_EQ(trace({LSP_TRACE_ALL_FLAGS | LSP_TRACE_MAX_LOSS | LSP_TRACE_OCCLUSION, 0, LSP_QUALITY_ACCURATE, 5}), LSP_OK);
+  EXPECT_EQ(
+      trace({LSP_TRACE_ALL_FLAGS | LSP_TRACE_MAX_LOSS | LSP_TRACE_OCCLUSION, 0, LSP_QUALITY_ACCURATE, 5}),
+      LSP_OK);
   EXPECT_EQ(counts.rays, 1u);
 }
 

@@ -229,7 +229,9 @@ TEST_F(View, BounceIsThatOfLspRender) {
   ASSERT_EQ(
       run("lsp-view " + file("corner.lsp") + options + "--frames 4 --split 1 --screenshot " + file("v.png")),
       0);
-  ASSERT_EQ(run("lsp-render " + file("corner.lsp") + " -o " + file("r.png") + options + "--samples 4"), 0);
+  ASSERT_EQ(run("lsp-render " + file("corner.lsp") + " -o " + file("r.png") + options +
+                "--samples 4 --exposure 0 --up y"),
+            0);
   const Shot seen = read_png(file("v.png"));
   EXPECT_GT(mean(seen), 4.0) << "it is black";
   EXPECT_LT(difference(seen, read_png(file("r.png")), 0, kWidth).mean, 0.5);
