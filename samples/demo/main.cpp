@@ -43,11 +43,9 @@ int main(int argc, char** argv) {
   add_common_options(app, kProgram, common);
   app.add_option(
          "FOLDER", folder,
-         "With bake.json, exact.json, approx.json, compare.json and the pictures; of the other qualities "
-         "fast.json, compare_fast.json, accurate.json, compare_accurate.json where they are there; for "
-         "the curve curve_exact.json, curve_NAME.json and curve_compare_NAME.json, NAME a quality or a "
-         "largest "
-         "loss of 30, 10, 3 or 1")
+         "With bake.json, exact.json, approx.json, compare.json and the pictures; for the dial's curve "
+         "curve_exact.json, curve_NAME.json and curve_compare_NAME.json, NAME a quality or a largest loss of "
+         "30, 10, 3 or 1")
       ->required();
   app.add_option("-o,--output", output, "The page")->required();
   app.add_option("--title", title, "What was baked");
@@ -61,13 +59,7 @@ int main(int argc, char** argv) {
                       read_json(folder + "/approx.json"),
                       read_json(folder + "/compare.json"),
                       {},
-                      {},
                       {}};
-      for (const std::string name : {"fast", "accurate"}) {
-        if (!std::filesystem::exists(folder + "/" + name + ".json")) continue;
-        figures.others.push_back({name, read_json(folder + "/" + name + ".json"),
-                                  read_json(folder + "/compare_" + name + ".json")});
-      }
       if (std::filesystem::exists(folder + "/curve_exact.json")) {
         figures.curve_exact = read_json(folder + "/curve_exact.json");
         for (const std::string name : {"fast", "balanced", "accurate", "30", "10", "3", "1"}) {

@@ -39,6 +39,9 @@ double times(const nlohmann::json& exact, const nlohmann::json& approximate) {
 
 double speed_up(const Figures& f, const nlohmann::json& approximate) { return times(f.exact, approximate); }
 
+// Of a setting: --max-loss, not --quality.
+bool is_number(const std::string& name) { return name.find_first_not_of("0123456789.") == std::string::npos; }
+
 bool has_cells(const Figures& f) { return f.bake.contains("cells") && !f.bake.at("cells").is_null(); }
 
 bool has_tables(const Figures& f) { return has_cells(f) || number(f.bake, "line_spaces") > 0; }
@@ -97,10 +100,9 @@ std::string curve(const Figures& f) {
   std::vector<Point> points;
   double widest = 0;
   double fastest = 1;
-  for (const Figures::Quality& q : f.curve) {
-    const bool number_alone = q.name.find_first_not_of("0123456789.") == std::string::npos;
+  for (const Figures::Setting& q : f.curve) {
     points.push_back({100 * number(q.compare, "relative_mean"), times(f.curve_exact, q.approximate), q.name,
-                      !number_alone});
+                      !is_number(q.name)});
     widest = std::max(widest, points.back().error);
     fastest = std::max(fastest, points.back().speed);
   }
@@ -157,30 +159,18 @@ std::string curve(const Figures& f) {
   return svg + "</table>\n";
 }
 
-// The qualities side by side; nothing where there is but one.
+// What the dial does to this scene; nothing where there is none.
 std::string dial(const Figures& f) {
-  if (f.others.empty() || !has_tables(f)) return "";
+  if (f.curve.empty() || !has_tables(f)) return "";
   const bool lights = f.approximate.value("light_quality", "") == "fast";
-  std::string html =
-      "<h2>The dial</h2>\n<p>The same file at other qualities: where tables lose more than the quality "
-      "allows, a cell "
-      "is traced exactly. fast is tables alone" +
-      std::string(lights
-                      ? ", and so are in all of them the rays to lights from where others land, whose errors "
-                        "show least (<code>--light-quality fast</code>)"
-                      : "") +
-      ".</p>\n<table><thead><tr><th>quality</th><th>rays a second, "
-      "times "
-      "exact</th><th>mean error</th><th>pixels that differ visibly</th></tr></thead>\n";
-  const auto add = [&](const std::string& name, const nlohmann::json& approximate,
-                       const nlohmann::json& compare) {
-    html += "<tr><th>" + escape_html(name) +
-            format("</th><td>%.2f</td><td>%.2f %%</td><td>%.2f %%</td></tr>\n", speed_up(f, approximate),
-                   100 * number(compare, "relative_mean"), 100 * number(compare, "pixels_over_5_percent"));
-  };
-  add("balanced (shown)", f.approximate, f.compare);
-  for (const Figures::Quality& other : f.others) add(other.name, other.approximate, other.compare);
-  return html + "</table>\n" + curve(f);
+  return "<h2>The dial</h2>\n<p>The same file at other settings; the pictures above are balanced. Where "
+         "tables "
+         "lose more than a setting allows, a cell is traced exactly; fast is tables alone" +
+         std::string(lights ? ". Rays to lights from where others land are always answered by tables alone: "
+                              "they are the most, and their errors show least (<code>--light-quality "
+                              "fast</code>)"
+                            : "") +
+         ".</p>\n" + curve(f);
 }
 
 constexpr const char* kStyle = R"(
@@ -397,9 +387,14 @@ std::string make_summary(const Figures& f) {
       "difference:  %.2f times the rays a second; PSNR %s, mean error %.2f %%, %.2f %% of pixels visibly\n",
       speed_up(f, f.approximate), psnr(f.compare).c_str(), 100 * number(f.compare, "relative_mean"),
       100 * number(f.compare, "pixels_over_5_percent"));
-  for (const Figures::Quality& other : f.others)
-    text += format("%-12s %.2f times the rays a second; mean error %.2f %%\n", (other.name + ":").c_str(),
-                   speed_up(f, other.approximate), 100 * number(other.compare, "relative_mean"));
+  // Settings that are qualities.
+  std::string qualities;
+  for (const Figures::Setting& s : f.curve) {
+    if (is_number(s.name)) continue;
+    qualities += format("%s %s %.2f times, %.2f %%", qualities.empty() ? "" : ";", s.name.c_str(),
+                        times(f.curve_exact, s.approximate), 100 * number(s.compare, "relative_mean"));
+  }
+  if (!qualities.empty()) text += "dial:        in a small picture, not denoised:" + qualities + "\n";
   return text;
 }
 

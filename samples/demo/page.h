@@ -17,15 +17,14 @@ struct Figures {
   nlohmann::json exact;
   nlohmann::json approximate;
   nlohmann::json compare;
-  // Of cells: the same picture at the other qualities, what lsp-render and lsp-compare printed.
-  struct Quality {
+  // Of cells: a smaller picture at settings of the dial, what lsp-render and lsp-compare printed, and its
+  // exact one; null where there are none.
+  struct Setting {
     std::string name;
     nlohmann::json approximate;
     nlohmann::json compare;
   };
-  std::vector<Quality> others;
-  // A smaller picture at many settings of the dial, and its exact one; null where there are none.
-  std::vector<Quality> curve;
+  std::vector<Setting> curve;
   nlohmann::json curve_exact;
 };
 

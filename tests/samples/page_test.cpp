@@ -38,7 +38,7 @@ Figures example() {
                                   {"rmse", 0.0},
                                   {"relative_mean", 0.0},
                                   {"pixels_over_5_percent", 0.0}};
-  return {"a <scene>", 0.125, bake, render, approximate, compare, {}, {}, {}};
+  return {"a <scene>", 0.125, bake, render, approximate, compare, {}, {}};
 }
 
 TEST(Page, Base64) {
@@ -82,18 +82,19 @@ TEST(Page, TellsOfCellsAndTheirDial) {
   nlohmann::json fast = figures.approximate, compare = figures.compare;
   fast["indirect_mrays_per_second"] = 9.0;
   compare["relative_mean"] = 0.0625;
-  figures.others.push_back({"fast", fast, compare});
+  figures.curve.push_back({"fast", fast, compare});
+  figures.curve.push_back({"10", fast, compare});
+  figures.curve_exact = figures.exact;
   const std::string page = make_page(figures, {});
   for (const char* part : {"24 x 10 x 15", "2130", "The dial", "4.50", "6.25 %"})
     EXPECT_NE(page.find(part), std::string::npos) << part;
   EXPECT_EQ(page.find("Line Spaces"), std::string::npos);
-  EXPECT_NE(make_summary(figures).find("fast:        4.50 times"), std::string::npos);
+  EXPECT_NE(make_summary(figures).find("not denoised: fast 4.50 times, 6.25 %\n"), std::string::npos);
 }
 
 TEST(Page, DrawsTheDialsCurve) {
   Figures figures = example();
   figures.bake["cells"] = {{"grid", {24, 10, 15}}, {"filled", 2130}, {"planes", 1}, {"splits", 1}};
-  figures.others.push_back({"fast", figures.approximate, figures.compare});
   EXPECT_EQ(make_page(figures, {}).find("<svg"), std::string::npos);
   figures.curve_exact = figures.exact;
   const auto add = [&](const char* name, double speed, double error) {
@@ -121,7 +122,7 @@ TEST(Page, DrawsTheDialsCurve) {
   for (const char* part : {"--max-loss 3", "3.25</td><td>5.75 %", "1.25</td><td>1.25 %"})
     EXPECT_NE(page.find(part), std::string::npos) << part;
   // Equal pictures, as of a scene that tables answer without error, are drawn, too.
-  for (Figures::Quality& point : figures.curve) point.compare["relative_mean"] = 0.0;
+  for (Figures::Setting& point : figures.curve) point.compare["relative_mean"] = 0.0;
   EXPECT_NE(drawing().find("<circle"), std::string::npos);
   EXPECT_EQ(drawing().find("nan"), std::string::npos);
 }
