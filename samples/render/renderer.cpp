@@ -104,7 +104,6 @@ class Renderer {
     albedo_ = guides_.normal = guides_.position = Picture(options.width, options.height);
     guides_.depth.resize(pixels);
     met_.resize(pixels);
-    covered_.resize(pixels);
     order_pixels();
   }
 
@@ -132,7 +131,7 @@ class Renderer {
     for (size_t i = 0; i < picture_.pixels.size(); ++i) {
       const auto bright = static_cast<double>(luminance(picture_.pixels[i]));
       total_luminance += bright;
-      if (covered_[i] == 0) continue;
+      if (met_[i] == 0) continue;
       surface_log += std::log(std::max(bright, 1e-4));
       ++surface_pixels;
     }
@@ -238,6 +237,7 @@ class Renderer {
   // Whether what starts at `item` is verified: by a hash, not by a point of the sequence, whose points are
   // spread over a pixel's samples in step with those that say where the path goes.
   bool verifies(uint32_t item, Dimension dimension) const {
+    if (!(options_.verify > 0)) return false;
     const uint32_t seed = hash_combine(hash_combine(order_[first_ + item], sample_), dimension);
     return static_cast<float>(hash_mix(seed) >> 8) * 0x1p-24f < options_.verify;
   }
@@ -260,7 +260,7 @@ class Renderer {
     for (uint32_t i = 0; i < count_; ++i) {
       if (std::isfinite(hits_[i].t)) {
         surfaces_.push_back({i, {}, {}});
-        covered_[order_[first_ + i]] = 1;
+        met_[order_[first_ + i]] += 1.0f;
       } else if (options_.effect == Effect::kAmbientOcclusion) {
         add(i, kSharp, glm::vec3(1.0f));
       } else if (wants(Effect::kDirect)) {
@@ -281,7 +281,6 @@ class Renderer {
   // Primary rays have unit length, so that t is the distance. A pixel has one surface a sample.
   void keep_guides(const Surface& s, float distance) {
     const uint32_t pixel = order_[first_ + s.item];
-    met_[pixel] += 1.0f;
     const bool occlusion = options_.effect == Effect::kAmbientOcclusion;
     albedo_.pixels[pixel] += occlusion ? glm::vec3(1.0f) : s.point.base_color * (1.0f - s.point.metallic);
     guides_.normal.pixels[pixel] += s.point.shading_normal;
@@ -599,6 +598,7 @@ class Renderer {
   }
 
   void trace_light(lsp_trace_options options, bool indirect) {
+    if (rays_.empty()) return;
     hits_.resize(rays_.size());
     options.flags |= LSP_TRACE_OCCLUSION;
     const double seconds = tracer_.trace(options, rays_, hits_);
@@ -625,8 +625,7 @@ class Renderer {
   std::array<std::vector<float>, kComponents> squares_;  // of luminance
   Picture albedo_;
   Guides guides_;
-  std::vector<float> met_;        // samples that met a surface, for the denoiser
-  std::vector<uint8_t> covered_;  // whether any did
+  std::vector<float> met_;  // samples that met a surface
 
   // The wave's state, kept from sample to sample for its memory.
   size_t first_ = 0;
