@@ -70,6 +70,7 @@ class Builder {
     for (size_t i = 0; i < references.size(); ++i) {
       references[i].triangle = uint32_t(i);
       for (int c = 0; c < 3; ++c) references[i].box.grow(corner(uint32_t(i), c));
+      if (options_.within) clip(references[i], *options_.within);
       bounds.grow(references[i].box);
     }
     root_area_ = bounds.half_area();
@@ -233,6 +234,21 @@ class Builder {
     right = intersection(right, r.box);
     left.hi[axis] = std::min(left.hi[axis], plane);
     right.lo[axis] = std::max(right.lo[axis], plane);
+  }
+
+  // Leaves of a reference's box what is inside another one; all of it where rounding leaves nothing.
+  void clip(Reference& r, const Box& within) const {
+    for (int axis = 0; axis < 3; ++axis) {
+      Box outside, rest;
+      if (r.box.lo[axis] < within.lo[axis]) {
+        cut(r, axis, within.lo[axis], outside, rest);
+        if (!rest.empty()) r.box = rest;
+      }
+      if (r.box.hi[axis] > within.hi[axis]) {
+        cut(r, axis, within.hi[axis], rest, outside);
+        if (!rest.empty()) r.box = rest;
+      }
+    }
   }
 
   // Whether the borders of the bins are apart by more than rounding.

@@ -8,6 +8,7 @@
 #include <functional>
 #include <vector>
 
+#include "box.h"
 #include "lsp/layout.h"
 #include "mesh.h"
 
@@ -27,6 +28,8 @@ struct BvhOptions {
   // Spatial splits are tried where the children of the best object split overlap in a box with more than this
   // share of the root's area (Stich's alpha).
   double split_overlap = 1e-5;
+  // What of the triangles lies outside is left out, as nobody traces it. Null: nothing is.
+  const Box* within = nullptr;
   // Below this depth nodes are halved by count, so that no tree is much deeper.
   uint32_t heuristic_depth = LSP_MAX_STACK - 34;
 };

@@ -184,8 +184,11 @@ class Filler {
       for (const lsp_float3& v : {t.v0, t.v1, t.v2}) mesh.positions.push_back(vec(v));
       mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
     }
+    const Box box = {lo_ - scene_.grid.margin, lo_ + size_ + scene_.grid.margin};
     BvhOptions options;
-    options.spatial_splits = false;
+    options.within = &box;
+    options.split_budget =
+        std::min(options.split_budget, double(LSP_CELL_MAX_REFERENCES - 1) / double(cell_.count) - 1);
     options.heuristic_depth = LSP_MAX_CELL_DEPTH - uint32_t(std::bit_width(LSP_CELL_MAX_REFERENCES));
     Bvh bvh = build_bvh(mesh, options);
     out_.tree = compact(bvh, lo_ - scene_.grid.margin, size_ + 2 * scene_.grid.margin);
@@ -291,7 +294,8 @@ class Filler {
     surface.normals.clear();
     surface.area.clear();
     float sum = 0;
-    for (const LspTriangle& t : local_) {
+    for (const uint32_t r : records_) {
+      const LspTriangle& t = scene_.triangles[r];
       const Polygon p = clip(t, lo, hi);
       if (p.count < 3) continue;
       const glm::vec3 normal = glm::cross(vec(t.v1) - vec(t.v0), vec(t.v2) - vec(t.v0));
