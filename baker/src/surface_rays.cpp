@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "lsp/lsp.h"
-#include "pcg.h"
+#include "random.h"
 #include "vectors.h"
 
 namespace lsp {
@@ -12,29 +12,11 @@ namespace {
 
 constexpr double kOffset = 1e-4;  // of the diagonal
 
-double random(uint64_t ray, uint32_t dimension) {
-  const uint32_t seed =
-      uint32_t(ray) * 747796405u + uint32_t(ray >> 32) * 277803737u + dimension * 2891336453u + 1u;
-  return (pcg(seed) + 0.5) / 4294967296.0;
-}
-
 double diagonal(const LspHeader& h) { return glm::length(dvec(h.bounds_max) - dvec(h.bounds_min)); }
-
-// Uniform on the unit sphere with square roots only, so that every machine makes the same (Marsaglia 1972).
-glm::dvec3 on_sphere(uint64_t ray, uint32_t dimension) {
-  double x = 0, y = 0, square = 2;
-  for (uint32_t attempt = 0; square >= 1 || square == 0; ++attempt) {
-    x = 2 * random(ray, dimension + 2 * attempt) - 1;
-    y = 2 * random(ray, dimension + 1 + 2 * attempt) - 1;
-    square = x * x + y * y;
-  }
-  const double f = 2 * std::sqrt(1 - square);
-  return {x * f, y * f, 1 - 2 * square};
-}
 
 // Cosine-distributed about `n`: a point on the sphere about the normal's tip.
 glm::dvec3 cosine_direction(const glm::dvec3& n, uint64_t ray) {
-  return glm::normalize(n * (1 + 1e-9) + on_sphere(ray, 3));
+  return glm::normalize(n * (1 + 1e-9) + random_on_sphere(ray, 3));
 }
 
 glm::dvec3 geometric_normal(const LspTriangle& t) {
@@ -63,9 +45,15 @@ LspRay SurfaceRays::make(uint64_t point, uint64_t ray) const {
     v = 1 - v;
   }
   const glm::dvec3 a = dvec(t.v1) - dvec(t.v0), b = dvec(t.v2) - dvec(t.v0);
-  const glm::dvec3 n = geometric_normal(t);
-  const glm::dvec3 o = dvec(t.v0) + a * u + b * v + n * offset_;
-  return {f3(o), 0, f3(cosine_direction(n, ray)), INFINITY};
+  return from({dvec(t.v0) + a * u + b * v, geometric_normal(t)}, ray);
+}
+
+LspRay SurfaceRays::from(const SurfacePoint& point, uint64_t ray) const {
+  return {f3(point.position + point.normal * offset_), 0, f3(cosine_direction(point.normal, ray)), INFINITY};
+}
+
+glm::dvec3 SurfaceRays::normal_of(uint32_t record) const {
+  return geometric_normal(baked_.triangles[record]);
 }
 
 std::vector<LspRay> surface_rays(const Baked& baked, uint32_t points, uint32_t per_point) {
@@ -78,6 +66,7 @@ std::vector<LspRay> surface_rays(const Baked& baked, uint32_t points, uint32_t p
 
 std::vector<LspRay> seen_rays(const Baked& baked, uint32_t points, uint32_t per_point) {
   const LspHeader& h = baked.header;
+  const SurfaceRays make(baked);
   const glm::dvec3 lo = dvec(h.bounds_min), extent = dvec(h.bounds_max) - lo;
   const lsp_scene scene = view(baked);
   std::vector<uint32_t> records(h.primitive_count);
@@ -87,9 +76,9 @@ std::vector<LspRay> seen_rays(const Baked& baked, uint32_t points, uint32_t per_
   for (uint64_t i = 1; rays.size() < size_t(points) * per_point && i < 16ull * points; ++i) {
     const uint64_t seed = i + (uint64_t{1} << 40);
     const glm::dvec3 inside = lo + extent * glm::dvec3(random(seed, 20), random(seed, 21), random(seed, 22));
-    LspRay look{f3(inside), 0, f3(on_sphere(seed, 23)), INFINITY};
+    LspRay look{f3(inside), 0, f3(random_on_sphere(seed, 23)), INFINITY};
     if (i % 6 == 0) {
-      const glm::dvec3 eye = lo + 0.5 * extent + on_sphere(seed, 63) * diagonal(h);
+      const glm::dvec3 eye = lo + 0.5 * extent + random_on_sphere(seed, 63) * diagonal(h);
       look.origin = f3(eye);
       look.direction = f3(inside - eye);
     }
@@ -97,13 +86,12 @@ std::vector<LspRay> seen_rays(const Baked& baked, uint32_t points, uint32_t per_
     const lsp_trace_options exact = {0, 0, 0, 0};
     if (lsp_trace(&scene, &exact, &look, &hit, 1, nullptr, nullptr) != LSP_OK || hit.primitive == LSP_NONE)
       continue;
-    const glm::dvec3 n = geometric_normal(baked.triangles[records[hit.primitive]]);
+    const glm::dvec3 n = make.normal_of(records[hit.primitive]);
     const glm::dvec3 d = dvec(look.direction);
     // From the back of a closed object nobody sees it.
     if (glm::dot(n, d) > 0) continue;
-    const glm::dvec3 o = dvec(look.origin) + d * double(hit.t) + n * (kOffset * diagonal(h));
-    for (uint32_t k = 0; k < per_point; ++k)
-      rays.push_back({f3(o), 0, f3(cosine_direction(n, seed * per_point + k)), INFINITY});
+    const SurfacePoint point{dvec(look.origin) + d * double(hit.t), n};
+    for (uint32_t k = 0; k < per_point; ++k) rays.push_back(make.from(point, seed * per_point + k));
   }
   return rays;
 }

@@ -3,11 +3,16 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/glm.hpp>
 #include <vector>
 
 #include "bake.h"
 
 namespace lsp {
+
+struct SurfacePoint {
+  glm::dvec3 position, normal;  // geometric
+};
 
 // Points spread evenly over the surfaces, and cosine-distributed directions about their geometric normals;
 // rays begin a 1e-4 of the diagonal above the surface.
@@ -17,6 +22,10 @@ class SurfaceRays {
 
   // Ray number `ray` from point number `point`.
   LspRay make(uint64_t point, uint64_t ray) const;
+  // Likewise from a point of the caller's.
+  LspRay from(const SurfacePoint& point, uint64_t ray) const;
+
+  glm::dvec3 normal_of(uint32_t record) const;  // geometric, of a triangle record
 
  private:
   const Baked& baked_;

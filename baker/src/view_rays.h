@@ -1,0 +1,26 @@
+// Rays of ambient occlusion and first bounces in small pictures of a scene, to measure a bake with: what errs
+// in one view may be rare elsewhere. Deterministic.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "bake.h"
+
+namespace lsp {
+
+// What the pixels of one view see: `count` points from `first` on, and nothing in the rest of `pixels`.
+struct View {
+  uint32_t first, count, pixels;
+};
+
+struct ViewRays {
+  std::vector<View> views;
+  std::vector<LspRay> rays;  // per_point cosine rays of each point, one after the other
+};
+
+// Up to `views` pictures of side x side pixels, a third each from close to a surface, from within the scene
+// and from around it, as far as such views see surfaces from in front, and none right before the eye.
+ViewRays view_rays(const Baked& baked, uint32_t views, uint32_t side, uint32_t per_point);
+
+}  // namespace lsp
