@@ -80,9 +80,21 @@ HWY_INLINE V8 smaller(V8 x, V8 than) {
 #endif
 }
 
-// lsp_min, lsp_max and a chosen one.
-HWY_INLINE V4 min_of(V4 a, V4 b) { return hn::IfThenElse(hn::Lt(b, a), b, a); }
-HWY_INLINE V4 max_of(V4 a, V4 b) { return hn::IfThenElse(hn::Lt(a, b), b, a); }
+// lsp_min and lsp_max, of a NaN as well: x86 takes the second where neither is less.
+HWY_INLINE V4 min_of(V4 a, V4 b) {
+#if HWY_ARCH_X86
+  return hn::Min(b, a);
+#else
+  return hn::IfThenElse(hn::Lt(b, a), b, a);
+#endif
+}
+HWY_INLINE V4 max_of(V4 a, V4 b) {
+#if HWY_ARCH_X86
+  return hn::Max(b, a);
+#else
+  return hn::IfThenElse(hn::Lt(a, b), b, a);
+#endif
+}
 
 struct P4 {
   V4 x, y, z;
@@ -331,13 +343,13 @@ class Tracer {
   }
 
   HWY_INLINE void hit_four(uint32_t first, uint32_t count, const Ready& r, Text::LspBest& best) const {
-    // Where there are fewer, the last stands for those that are not there.
-    static constexpr uint8_t kNumbers[kLeafLanes][4] = {
-        {0, 0, 0, 0}, {0, 1, 1, 1}, {0, 1, 2, 2}, {0, 1, 2, 3}};
-    const LspTriangle* const triangles = scene_.triangles + first;
+    // Where there are fewer, what follows is read with them and not heeded.
+    const LspTriangle* triangles = scene_.triangles + first;
+    LspTriangle copies[kLeafLanes];
+    if (triangle_count_ - first < kLeafLanes) [[unlikely]]
+      triangles = copy_last(first, copies);
     const float* records[kLeafLanes];
-    for (size_t i = 0; i < kLeafLanes; ++i)
-      records[i] = reinterpret_cast<const float*>(triangles + kNumbers[count - 1][i]);
+    for (size_t i = 0; i < kLeafLanes; ++i) records[i] = reinterpret_cast<const float*>(triangles + i);
     // Seen from the origin, the ray's axis last.
     const auto corner = [&](size_t c) HWY_ATTR {
       const auto row = [&](size_t i)
@@ -371,6 +383,13 @@ class Tracer {
     if (met != 0) keep_nearest(met, first, r, a, b, c, v, w, det, best);
   }
 
+  // The file's last triangles, from `first` on, and as many more as make four.
+  HWY_NOINLINE const LspTriangle* copy_last(uint32_t first, LspTriangle* copies) const {
+    for (uint32_t i = 0; i < kLeafLanes; ++i)
+      copies[i] = scene_.triangles[first + i < triangle_count_ ? first + i : triangle_count_ - 1];
+    return copies;
+  }
+
   // Of the triangles that the ray's line passes through, a bit each.
   HWY_INLINE void keep_nearest(uint32_t met, uint32_t first, const Ready& r, const P4& a, const P4& b,
                                const P4& c, V4 v, V4 w, V4 det, Text::LspBest& best) const {
@@ -402,12 +421,12 @@ class Tracer {
   HWY_INLINE bool walk(const Ready& r, Text::LspBest& best) {
     const V8 tmin = hn::Set(d8, r.tmin);
     uint32_t top = 1, left = most_, at = 0;
+    const LspWideNode* node = nodes_;
     stack_[0] = {{-HUGE_VALF}, kNoNode};
     for (;;) {
       if (left == 0 || top + kChildren > kStack) return false;
       --left;
       HWY_ALIGN float t[kChildren];
-      const LspWideNode* node = nodes_ + at;
       uint32_t hits = hit_children(*node, r, tmin, hn::Set(d8, best.t), t);
       uint32_t child = LSP_WIDE_NO_CHILD;
       if (hits != 0) {
@@ -428,6 +447,8 @@ class Tracer {
       for (;;) {
         if ((child & LSP_WIDE_NODE_BIT) != 0) {
           at = node->node_first + (child & ~LSP_WIDE_NODE_BIT);
+          // Where the child lies is known sooner from where the first one does.
+          node = nodes_ + node->node_first + (static_cast<ptrdiff_t>(child) - ptrdiff_t{LSP_WIDE_NODE_BIT});
           if (child != LSP_WIDE_NO_CHILD && at < node_count_) break;
         } else {
           if (left == 0) return false;
