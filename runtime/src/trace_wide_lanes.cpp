@@ -133,50 +133,64 @@ HWY_INLINE V4 plane_depth(const P4& direction, V4 shear_z, const P4& a, const P4
   return min_of(max_of(max_of(za, zb), zc), max_of(min_of(min_of(za, zb), zc), t));
 }
 
-// Lanes of a vector that hold x, y and z.
-HWY_INLINE V4 xyz(V4 v) {
-  alignas(16) static constexpr uint32_t kThree[4] = {~0u, ~0u, ~0u, 0};
-  const hn::RebindToUnsigned<D4> du;
-  return hn::And(v, hn::BitCast(d4, hn::Load(du, kThree)));
-}
-// The largest of four lanes, none of them a NaN, in all of them.
-HWY_INLINE V4 largest_lane(V4 v) {
-  const V4 pairs = hn::Max(v, hn::Shuffle2301(v));
-  return hn::Max(pairs, hn::Shuffle1032(pairs));
-}
-template <class D>
-HWY_INLINE hn::Vec<D> in_every_block(D d, V4 v) {
-  if constexpr (hn::MaxLanes(D()) == hn::MaxLanes(D4()))
-    return v;
-  else
-    return hn::Combine(d, v, v);
-}
-
 // Bytes of a corner whose axes are rotated so that the ray's comes last: lsp_rotate.
 alignas(16) constexpr uint8_t kRotations[3][16] = {
     {4, 5, 6, 7, 8, 9, 10, 11, 0, 1, 2, 3, 12, 13, 14, 15},
     {8, 9, 10, 11, 0, 1, 2, 3, 4, 5, 6, 7, 12, 13, 14, 15},
     {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15},
 };
+// By the axes along which a ray goes up, a bit each: bytes of the planes that it meets first.
+constexpr uint8_t kPlanes[8][3] = {{24, 32, 40}, {0, 32, 40}, {24, 8, 40}, {0, 8, 40},
+                                   {24, 32, 16}, {0, 32, 16}, {24, 8, 16}, {0, 8, 16}};
 using Bytes = hn::Vec<hn::Repartition<uint8_t, D4>>;
 HWY_INLINE V4 rotated(V4 v, Bytes by) {
   return hn::BitCast(d4, hn::TableLookupBytes(hn::BitCast(hn::Repartition<uint8_t, D4>(), v), by));
 }
 
-// A ray made ready: what boxes and triangles take of lsp_setup, operation by operation, its three axes side
-// by side and nothing decided by a branch.
-struct Ready {
-  // For boxes, x y z in every block of lanes: where planes are met is plane * inverse + base.
-  V8 inverse, first_base, last_base;
-  // By axis the planes that are met first and last: byte of LspWideNode.planes.
-  size_t first[3], last[3];
-  float tmin, tmax, to_given;
+// Rays made ready, a lane each, of which every ray then has its rows: what boxes and triangles take of
+// lsp_setup, operation by operation.
+struct Batch {
+  using Rows = float[kLanes][4];  // x, y, z, and zero
+  using Values = float[kLanes];
+  // For boxes: where a plane is met is plane * inverse + base, of those met first and of those met last.
+  HWY_ALIGN Rows inverse, first_base, last_base;
   // For triangles, the ray's axis last.
+  HWY_ALIGN Rows origin, shear, direction;
+  HWY_ALIGN Values tmin, tmax, to_given;
+  HWY_ALIGN uint32_t axis[kLanes];
+  HWY_ALIGN uint32_t forward[kLanes];  // axes along which the ray goes up, a bit each
+  uint32_t ready;                      // of the others nothing else is set: they are invalid, or not tame
+};
+
+// One of them, on its way.
+struct Ready {
+  V8 inverse, first_base, last_base;  // in every block of four lanes
+  const uint8_t *first, *last;  // by axis the planes that are met first and last: byte of LspWideNode.planes
+  float tmin, tmax, to_given;
+  const float *origin, *shear, *direction;
+  size_t axis;
   Bytes rotation;
-  HWY_ALIGN float origin[4];
-  HWY_ALIGN float shear[4];
-  HWY_ALIGN float direction[4];
-  HWY_ALIGN float unrotated[4];  // the direction
+
+  HWY_INLINE Ready(const Batch& b, size_t i)
+      : inverse(hn::LoadDup128(d8, b.inverse[i])),
+        first_base(hn::LoadDup128(d8, b.first_base[i])),
+        last_base(hn::LoadDup128(d8, b.last_base[i])),
+        first(kPlanes[b.forward[i]]),
+        last(kPlanes[7 - b.forward[i]]),
+        tmin(b.tmin[i]),
+        tmax(b.tmax[i]),
+        to_given(b.to_given[i]),
+        origin(b.origin[i]),
+        shear(b.shear[i]),
+        direction(b.direction[i]),
+        axis(b.axis[i]),
+        rotation(hn::Load(hn::Repartition<uint8_t, D4>(), kRotations[axis])) {}
+
+  // As given, scaled.
+  HWY_INLINE vec3 unrotated() const {
+    const float* d = direction;
+    return axis == 2 ? vec3(d[0], d[1], d[2]) : axis == 0 ? vec3(d[2], d[0], d[1]) : vec3(d[1], d[2], d[0]);
+  }
 };
 
 // What is waiting, of closest rays a child of a node: where it is entered, and 8 * node + child. Of any-hit
@@ -200,28 +214,34 @@ class Tracer {
         triangle_count_(scene.header->triangle_count),
         most_(scene.header->max_steps) {
     const lsp_float3 lo = scene.header->bounds_min, hi = scene.header->bounds_max;
-    const bool tame = is_tame(lsp_vec3(lo)) && is_tame(lsp_vec3(hi));
-    most_largest_ = tame ? kTame : 0;
-    for (int k = 0; k < 3; ++k) {
-      bounds_lo_[k] = (&lo.x)[k];
-      bounds_hi_[k] = (&hi.x)[k];
-    }
+    if (!is_tame(lsp_vec3(lo)) || !is_tame(lsp_vec3(hi))) most_largest_ = 0;
   }
 
   template <bool kAny>
-  HWY_INLINE LspHit trace(const LspRay& ray, uint32_t flags) {
-    Ready r;
-    if (!make_ready(ray, r)) return trace_singly(ray, flags);
+  HWY_INLINE void trace(const LspRay* rays, LspHit* hits, uint64_t count, uint32_t flags) {
+    for (uint64_t first = 0; first < count; first += kLanes) {
+      const uint64_t left = count - first;
+      const size_t here = left < kLanes ? static_cast<size_t>(left) : kLanes;
+      make_ready(rays + first, here);
+      for (size_t i = 0; i < here; ++i)
+        hits[first + i] = (batch_.ready >> i & 1u) != 0
+                              ? trace_one<kAny>(rays[first + i], Ready(batch_, i), flags)
+                              : trace_singly(rays[first + i], flags);
+    }
+  }
+
+ private:
+  template <bool kAny>
+  HWY_INLINE LspHit trace_one(const LspRay& ray, const Ready& r, uint32_t flags) {
     Text::LspSetup s;  // what lsp_finish asks for of a hit
     s.to_given = r.to_given;
-    s.direction = {r.unrotated[0], r.unrotated[1], r.unrotated[2]};
+    s.direction = r.unrotated();
     s.tmax = r.tmax;
     Text::LspBest best = Text::lsp_no_best(s);
     best.complete = node_count_ == 0 || walk<kAny>(r, best);
     return Text::lsp_finish(scene_, s, ray, best, flags);
   }
 
- private:
   static bool is_tame(const vec3& v) { return Text::lsp_largest(v) < kTame; }
 
   // Invalid rays, and those whose products may overflow.
@@ -234,56 +254,118 @@ class Tracer {
         .hit;
   }
 
-  // lsp_setup. False: the ray is invalid, or not tame.
-  HWY_INLINE bool make_ready(const LspRay& ray, Ready& r) const {
-    const hn::RebindToUnsigned<D4> du;
-    const V4 zero = hn::Zero(d4), one = hn::Set(d4, 1.0f);
-    const V4 o = xyz(hn::LoadU(d4, &ray.origin.x)), d = xyz(hn::LoadU(d4, &ray.direction.x));
-    const V4 m = hn::Abs(d), o_size = hn::Abs(o);
-    const V4 largest = largest_lane(m);
-    const M4 is_ready =
-        hn::And(hn::And(hn::Lt(o_size, hn::Set(d4, most_largest_)), hn::Lt(m, hn::Set(d4, HUGE_VALF))),
-                hn::Ge(largest, hn::Set(d4, 0x1p-126f)));
-    if (bits_of(d4, is_ready) != 15 || !(ray.tmin <= ray.tmax)) return false;
-
-    const auto exponent = hn::Min(hn::ShiftRight<23>(hn::BitCast(du, largest)), hn::Set(du, uint32_t{253}));
-    const V4 shrink = hn::BitCast(d4, hn::ShiftLeft<23>(hn::Sub(hn::Set(du, uint32_t{254}), exponent)));
-    const float to_scaled = hn::GetLane(hn::BitCast(d4, hn::ShiftLeft<23>(exponent)));
-    r.to_given = hn::GetLane(shrink);
-    const float step = uintBitsToFloat(1u) * to_scaled;
-    r.tmin = ray.tmin * to_scaled + step;
-    r.tmax = Text::lsp_min(Text::lsp_min(ray.tmax, LSP_FLOAT_MAX) * to_scaled - step, LSP_FLOAT_MAX);
-
-    const V4 scaled = hn::Mul(d, shrink);
-    const V4 direction = hn::IfThenZeroElse(hn::Lt(hn::Abs(scaled), hn::Set(d4, 8.6736174e-19f)), scaled);
-    const M4 is_zero = hn::Eq(direction, zero);
-    const V4 inverse = hn::IfThenElse(is_zero, hn::Set(d4, 1.2089258e24f),
-                                      hn::Div(one, hn::IfThenElse(is_zero, one, direction)));
-    hn::Store(direction, d4, r.unrotated);
-
-    const V4 reach = largest_lane(xyz(hn::Max(hn::Abs(hn::Sub(hn::Load(d4, bounds_lo_), o)),
-                                              hn::Abs(hn::Sub(hn::Load(d4, bounds_hi_), o)))));
-    const V4 err = hn::Add(hn::Mul(reach, hn::Set(d4, 9.5367432e-7f)),
-                           hn::Mul(largest_lane(o_size), hn::Set(d4, 2.3841858e-7f)));
-    const V4 plus = hn::Mul(hn::Add(o, err), inverse), minus = hn::Mul(hn::Sub(o, err), inverse);
-    const M4 forward = hn::Gt(inverse, zero);
-    r.inverse = in_every_block(d8, xyz(inverse));
-    r.first_base = in_every_block(d8, xyz(hn::Neg(hn::IfThenElse(forward, plus, minus))));
-    r.last_base = in_every_block(d8, xyz(hn::Neg(hn::IfThenElse(forward, minus, plus))));
-    const uint32_t goes_on = bits_of(d4, forward);
-    for (uint32_t k = 0; k < 3; ++k) {
-      const size_t near = (goes_on >> k & 1u) * 24;
-      r.first[k] = 8 * k + 24 - near;
-      r.last[k] = 8 * k + near;
+  struct P8 {
+    V8 x, y, z;
+  };
+  // Rays as lanes: the fields of LspRay.
+  struct Rays {
+    P8 origin, direction;
+    V8 tmin, tmax;
+  };
+  static HWY_INLINE Rays load(const LspRay* rays, size_t count) {
+    LspRay padded[kLanes];
+    if (count < kLanes) {
+      for (size_t i = 0; i < kLanes; ++i) padded[i] = rays[i < count ? i : count - 1];
+      rays = padded;
     }
+    // Of half of them in turn: origin and tmin in even lanes, direction and tmax in odd ones.
+    V8 low[4], high[4], even[4], odd[4];
+    hn::LoadInterleaved4(d8, &rays[0].origin.x, low[0], low[1], low[2], low[3]);
+    hn::LoadInterleaved4(d8, &rays[kLanes / 2].origin.x, high[0], high[1], high[2], high[3]);
+    for (size_t k = 0; k < 4; ++k) {
+      even[k] = hn::ConcatEven(d8, high[k], low[k]);
+      odd[k] = hn::ConcatOdd(d8, high[k], low[k]);
+    }
+    return {{even[0], even[1], even[2]}, {odd[0], odd[1], odd[2]}, even[3], odd[3]};
+  }
 
-    const auto axis = static_cast<size_t>(std::countr_zero(bits_of(d4, hn::Eq(m, largest))));
-    r.rotation = hn::Load(hn::Repartition<uint8_t, D4>(), kRotations[axis]);
-    const V4 p = rotated(direction, r.rotation);
-    hn::Store(p, d4, r.direction);
-    hn::Store(rotated(o, r.rotation), d4, r.origin);
-    hn::Store(hn::Div(hn::IfThenElse(hn::FirstN(d4, 2), p, one), hn::Broadcast<2>(p)), d4, r.shear);
-    return true;
+  static HWY_INLINE V8 largest_of(V8 x, V8 y, V8 z) { return hn::Max(hn::Max(x, y), z); }
+  static HWY_INLINE V8 reciprocal(V8 d) {
+    const V8 one = hn::Set(d8, 1.0f);
+    const auto is_zero = hn::Eq(d, hn::Zero(d8));
+    return hn::IfThenElse(is_zero, hn::Set(d8, 1.2089258e24f), hn::Div(one, hn::IfThenElse(is_zero, one, d)));
+  }
+  static HWY_INLINE void store(const P8& v, Batch::Rows& to) {
+    hn::StoreInterleaved4(v.x, v.y, v.z, hn::Zero(d8), d8, to[0]);
+  }
+
+  // lsp_setup of as many rays as there are lanes, or fewer.
+  HWY_INLINE void make_ready(const LspRay* from, size_t count) {
+    const hn::RebindToUnsigned<D8> du;
+    const auto set_u = [&](uint32_t x) HWY_ATTR { return hn::Set(du, x); };
+    const Rays rays = load(from, count);
+    const P8 o = rays.origin, d = rays.direction;
+    const V8 mx = hn::Abs(d.x), my = hn::Abs(d.y), mz = hn::Abs(d.z);
+    const V8 largest = largest_of(mx, my, mz);
+    const V8 far_out = largest_of(hn::Abs(o.x), hn::Abs(o.y), hn::Abs(o.z));
+    // A NaN is ordered to nothing; the largest of several may have lost one.
+    const auto is_number =
+        hn::And(hn::And(hn::Eq(d.x, d.x), hn::Eq(d.y, d.y)), hn::And(hn::Eq(o.x, o.x), hn::Eq(o.y, o.y)));
+    const auto is_tame =
+        hn::And(hn::Lt(far_out, hn::Set(d8, most_largest_)), hn::And(hn::Eq(d.z, d.z), hn::Eq(o.z, o.z)));
+    const auto is_direction =
+        hn::And(hn::Lt(largest, hn::Set(d8, HUGE_VALF)), hn::Ge(largest, hn::Set(d8, 0x1p-126f)));
+    batch_.ready = bits_of(
+        d8, hn::And(hn::And(is_number, is_tame), hn::And(is_direction, hn::Le(rays.tmin, rays.tmax))));
+
+    const auto exponent = hn::Min(hn::ShiftRight<23>(hn::BitCast(du, largest)), set_u(253));
+    const V8 shrink = hn::BitCast(d8, hn::ShiftLeft<23>(hn::Sub(set_u(254), exponent)));
+    const V8 to_scaled = hn::BitCast(d8, hn::ShiftLeft<23>(exponent));
+    const V8 step = hn::Mul(hn::BitCast(d8, set_u(1)), to_scaled), most = hn::Set(d8, LSP_FLOAT_MAX);
+    hn::Store(hn::Add(hn::Mul(rays.tmin, to_scaled), step), d8, batch_.tmin);
+    hn::Store(hn::Min(hn::Sub(hn::Mul(hn::Min(rays.tmax, most), to_scaled), step), most), d8, batch_.tmax);
+    hn::Store(shrink, d8, batch_.to_given);
+
+    const auto scaled = [&](V8 x) HWY_ATTR {
+      const V8 s = hn::Mul(x, shrink);
+      return hn::IfThenZeroElse(hn::Lt(hn::Abs(s), hn::Set(d8, 8.6736174e-19f)), s);
+    };
+    const P8 direction = {scaled(d.x), scaled(d.y), scaled(d.z)};
+    set_slabs(o, {reciprocal(direction.x), reciprocal(direction.y), reciprocal(direction.z)}, far_out);
+
+    const auto at_x = hn::And(hn::Ge(mx, my), hn::Ge(mx, mz)),
+               at_y = hn::AndNot(hn::Ge(mx, my), hn::Ge(my, mz));
+    const auto rotated = [&](const P8& v) HWY_ATTR {
+      return P8{hn::IfThenElse(at_x, v.y, hn::IfThenElse(at_y, v.z, v.x)),
+                hn::IfThenElse(at_x, v.z, hn::IfThenElse(at_y, v.x, v.y)),
+                hn::IfThenElse(at_x, v.x, hn::IfThenElse(at_y, v.y, v.z))};
+    };
+    const P8 p = rotated(direction);
+    store(p, batch_.direction);
+    store(rotated(o), batch_.origin);
+    store({hn::Div(p.x, p.z), hn::Div(p.y, p.z), hn::Div(hn::Set(d8, 1.0f), p.z)}, batch_.shear);
+    const auto mask_u = [&](auto mask) HWY_ATTR { return hn::RebindMask(du, mask); };
+    hn::Store(hn::IfThenZeroElse(mask_u(at_x), hn::IfThenElse(mask_u(at_y), set_u(1), set_u(2))), du,
+              batch_.axis);
+  }
+
+  // Boxes are grown by moving the origin: origin_plus and origin_minus.
+  HWY_INLINE void set_slabs(const P8& o, const P8& inverse, V8 far_out) {
+    const hn::RebindToUnsigned<D8> du;
+    const lsp_float3 lo = scene_.header->bounds_min, hi = scene_.header->bounds_max;
+    const auto reach_of = [&](float from, float to, V8 x) HWY_ATTR {
+      return hn::Max(hn::Abs(hn::Sub(hn::Set(d8, from), x)), hn::Abs(hn::Sub(hn::Set(d8, to), x)));
+    };
+    const V8 reach =
+        largest_of(reach_of(lo.x, hi.x, o.x), reach_of(lo.y, hi.y, o.y), reach_of(lo.z, hi.z, o.z));
+    const V8 err =
+        hn::Add(hn::Mul(reach, hn::Set(d8, 9.5367432e-7f)), hn::Mul(far_out, hn::Set(d8, 2.3841858e-7f)));
+    auto forward = hn::Zero(du);
+    const auto bases = [&](V8 x, V8 by, uint32_t bit, V8& first, V8& last) HWY_ATTR {
+      const auto up = hn::Gt(by, hn::Zero(d8));
+      const V8 plus = hn::Neg(hn::Mul(hn::Add(x, err), by)), minus = hn::Neg(hn::Mul(hn::Sub(x, err), by));
+      first = hn::IfThenElse(up, plus, minus);
+      last = hn::IfThenElse(up, minus, plus);
+      forward = hn::Or(forward, hn::IfThenElseZero(hn::RebindMask(du, up), hn::Set(du, bit)));
+    };
+    P8 first, last;
+    bases(o.x, inverse.x, 1, first.x, last.x);
+    bases(o.y, inverse.y, 2, first.y, last.y);
+    bases(o.z, inverse.z, 4, first.z, last.z);
+    store(inverse, batch_.inverse);
+    store(first, batch_.first_base);
+    store(last, batch_.last_base);
+    hn::Store(forward, du, batch_.forward);
   }
 
   static HWY_INLINE V8 planes_at(const uint8_t* bytes) {
@@ -520,9 +602,8 @@ class Tracer {
   const lsp_scene& scene_;
   const LspWideNode* nodes_;
   const uint32_t node_count_, triangle_count_, most_;
-  float most_largest_;  // coordinate of an origin: see kTame
-  HWY_ALIGN float bounds_lo_[4] = {};
-  HWY_ALIGN float bounds_hi_[4] = {};
+  float most_largest_ = kTame;  // coordinate of an origin; none, where the scene's are not tame
+  Batch batch_;
   Waiting stack_[kStack];
 };
 
@@ -530,9 +611,9 @@ void trace(const lsp_scene& scene, uint32_t flags, const LspRay* rays, LspHit* h
   Tracer tracer(scene);
   static_assert(sizeof tracer <= 20 * 1024);  // of the stack, as lsp/lsp.h says
   if ((flags & LSP_TRACE_ANY_HIT) != 0)
-    for (uint64_t i = 0; i < count; ++i) hits[i] = tracer.trace<true>(rays[i], flags);
+    tracer.trace<true>(rays, hits, count, flags);
   else
-    for (uint64_t i = 0; i < count; ++i) hits[i] = tracer.trace<false>(rays[i], flags);
+    tracer.trace<false>(rays, hits, count, flags);
 }
 
 }  // namespace
