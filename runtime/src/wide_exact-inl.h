@@ -62,8 +62,8 @@ class ExactTrace {
       const auto y = slabs(node, kBytesY, unit_y, corner_y);
       const auto z = slabs(node, kBytesZ, unit_z, corner_z);
       // lsp_cell_box: in lanes 0 and 2 those of the children. The others are not read.
-      const auto t_in = larger(larger(smaller_of(x), smaller_of(y)), larger(smaller_of(z), first));
-      const auto t_out = smaller(smaller(larger_of(x), larger_of(y)), smaller(larger_of(z), last));
+      const auto t_in = max_of(max_of(smaller_of(x), smaller_of(y)), max_of(smaller_of(z), first));
+      const auto t_out = min_of(min_of(larger_of(x), larger_of(y)), min_of(larger_of(z), last));
       const uint32_t hit = bits_of_4(hn::And(hn::Le(t_in, t_out), hn::Le(t_in, last)));
       const bool in_0 = (hit & 1u) != 0, in_1 = (hit & 4u) != 0;
       const bool is_0_nearer = in_0 && (!in_1 || (bits_of_4(hn::Le(t_in, hn::Shuffle1032(t_in))) & 1u) != 0);
@@ -113,10 +113,8 @@ class ExactTrace {
         hn::TableLookupBytesOr0(hn::LoadU(d8, reinterpret_cast<const uint8_t*>(&node)), hn::Load(d8, bytes));
     return hn::Add(hn::Mul(hn::ConvertTo(d, hn::BitCast(d_int, planes)), unit), corner);
   }
-  static HWY_INLINE V4 smaller(V4 a, V4 b) { return hn::IfThenElse(hn::Lt(b, a), b, a); }
-  static HWY_INLINE V4 larger(V4 a, V4 b) { return hn::IfThenElse(hn::Lt(a, b), b, a); }
-  static HWY_INLINE V4 smaller_of(V4 planes) { return smaller(planes, hn::Shuffle2301(planes)); }
-  static HWY_INLINE V4 larger_of(V4 planes) { return larger(planes, hn::Shuffle2301(planes)); }
+  static HWY_INLINE V4 smaller_of(V4 planes) { return min_of(planes, hn::Shuffle2301(planes)); }
+  static HWY_INLINE V4 larger_of(V4 planes) { return max_of(planes, hn::Shuffle2301(planes)); }
   static HWY_INLINE uint32_t bits_of_4(hn::Mask<D4> mask) {
     uint8_t bytes[8] = {};
     hn::StoreMaskBits(D4(), mask, bytes);
