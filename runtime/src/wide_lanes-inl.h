@@ -12,6 +12,7 @@
 
 #include "trace_subset.h"
 #include "trace_variant.h"
+#include "wide_triangles-inl.h"
 
 // What does not depend on the instruction set.
 #ifndef LSP_LANE_ORDERS
@@ -108,23 +109,6 @@ HWY_INLINE MF first_lanes(size_t count) { return hn::FirstN(df, count < kLanes ?
   for (Bits rest_##i = (bits); rest_##i != 0; rest_##i &= rest_##i - 1) \
     if (const auto i = static_cast<size_t>(std::countr_zero(rest_##i)); true)
 
-// lsp_min and lsp_max, of a NaN as well: x86 takes the second where neither is less.
-template <class V>
-HWY_INLINE V min_of(V a, V b) {
-#if HWY_ARCH_X86
-  return hn::Min(b, a);
-#else
-  return hn::IfThenElse(hn::Lt(b, a), b, a);
-#endif
-}
-template <class V>
-HWY_INLINE V max_of(V a, V b) {
-#if HWY_ARCH_X86
-  return hn::Max(b, a);
-#else
-  return hn::IfThenElse(hn::Lt(a, b), b, a);
-#endif
-}
 // floor(q > 0 ? q : 0), held below n: lsp_cell_patch.
 HWY_INLINE VF patch_of(VF q, VF n) {
   const VF i = hn::Floor(hn::IfThenElseZero(hn::Gt(q, hn::Zero(df)), q));
