@@ -6,10 +6,11 @@
 // triangle. The boxes are not: a plane lo + q * step is met at q * (step / d) + (lo / d - o / d), fused where
 // the machine can. What a ray hits does not depend on it, nor on the order in which children are visited (see
 // lsp_triangle; any-hit rays keep to the order of the file), as long as no box is missed whose triangle would
-// be hit. Rounding, with the words of lsp/traverse.h: along the axis (o / d) is off by u max|o|, lo / d by u
-// (max|o| + R), their sum and step / d by u R and 2 u R, q times that and the sum by 3 u R: 8 u R and 2 u
-// max|o| beside the 5 u R of the triangle, where a box is grown by 16 u R + 4 u max|o|. Where a product might
-// overflow, in scenes or from origins beyond 2^40, rays are traced by the text of single ones.
+// be hit. Rays are made ready a vector at a time, lsp_setup across lanes. Rounding, with the words of
+// lsp/traverse.h: along the axis (o / d) is off by u max|o|, lo / d by u (max|o| + R), their sum and step / d
+// by u R and 2 u R, q times that and the sum by 3 u R: 8 u R and 2 u max|o| beside the 5 u R of the triangle,
+// where a box is grown by 16 u R + 4 u max|o|. Where a product might overflow, in scenes or from origins
+// beyond 2^40, rays are traced by the text of single ones.
 #include "trace_wide_lanes.h"
 
 #include "simd_targets.h"
@@ -72,6 +73,7 @@ HWY_INLINE V8 smaller(V8 x, V8 than) {
 // By the axes along which a ray goes up, a bit each: bytes of the planes that it meets first.
 constexpr uint8_t kPlanes[8][3] = {{24, 32, 40}, {0, 32, 40}, {24, 8, 40}, {0, 8, 40},
                                    {24, 32, 16}, {0, 32, 16}, {24, 8, 16}, {0, 8, 16}};
+
 // Rays made ready, a lane each, of which every ray then has its rows: what boxes and triangles take of
 // lsp_setup, operation by operation.
 struct Batch {
@@ -357,7 +359,7 @@ class Tracer {
     if (triangle_count_ - first < kLeafLanes) [[unlikely]]
       triangles = copy_last(first, copies);
     const LspTriangle* const records[kLeafLanes] = {triangles, triangles + 1, triangles + 2, triangles + 3};
-    const auto number_of = [&](uint32_t lane) { return first + lane; };
+    const auto number_of = [&](uint32_t lane) HWY_ATTR { return first + lane; };
     hit_triangles(scene_, records, count, {r.origin, r.shear, r.direction, r.tmin, r.rotation}, number_of,
                   best);
   }
@@ -446,10 +448,12 @@ class Tracer {
   // Before it is known which of them are hit: of leaves and of nodes those that are likely to be (lines of
   // memory; children lie in the order of what they are worth to any-hit rays).
   HWY_INLINE void ask_for_children(const LspWideNode& node) const {
-    const auto* triangles = reinterpret_cast<const uint8_t*>(scene_.triangles + node.triangle_first);
-    const auto* nodes = reinterpret_cast<const uint8_t*>(nodes_ + node.node_first);
-    for (size_t line = 0; line < 3; ++line) __builtin_prefetch(triangles + 64 * line);
-    for (size_t line = 0; line < 2; ++line) __builtin_prefetch(nodes + 64 * line);
+    const auto ask = [](const void* array, uint64_t bytes, uint32_t lines) HWY_ATTR {
+      const uintptr_t first = reinterpret_cast<uintptr_t>(array) + bytes;
+      for (uint32_t i = 0; i < lines; ++i) __builtin_prefetch(reinterpret_cast<const void*>(first + 64 * i));
+    };
+    ask(scene_.triangles, uint64_t{node.triangle_first} * sizeof(LspTriangle), 3);
+    ask(nodes_, uint64_t{node.node_first} * sizeof(LspWideNode), 2);
   }
 
   // What waits is read later, if it is: it comes nearer meanwhile. Sponza 1.14 times as fast with it, the

@@ -1,6 +1,7 @@
 // Exact traces of cells, each in the cell's own small tree, several in turn, so that none waits for its
-// triangles: for trace_cells_wide.cpp. A second text of lsp_test_leaf (lsp/cells.h) as far as its boxes; the
-// boxes of a node's two children are tested side by side. The triangles are tested by that text itself.
+// triangles: for trace_cells_wide.cpp. A second text of lsp_test_leaf (lsp/cells.h) and of lsp_setup; the
+// boxes of a node's two children are tested side by side, and so are a leaf's triangles
+// (wide_triangles-inl.h).
 #if defined(LSP_WIDE_EXACT_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef LSP_WIDE_EXACT_INL_H
 #undef LSP_WIDE_EXACT_INL_H
@@ -81,7 +82,7 @@ class ExactTrace {
       records[i] = &lsp_load_triangle(scene, numbers[i]);
     }
     const Bytes rotation = hn::Load(hn::Repartition<uint8_t, D4>(), kRotations[axis_]);
-    const auto number_of = [&](uint32_t lane) { return numbers[lane]; };
+    const auto number_of = [&](uint32_t lane) HWY_ATTR { return numbers[lane]; };
     hit_triangles(scene, records, count_, {rows_[0], rows_[1], rows_[2], tmin_, rotation}, number_of, best_);
     if (top_ <= 1 || (any_hit && best_.triangle != LSP_NONE)) return false;
     ref_ = stack_[--top_];
