@@ -12,6 +12,7 @@
 
 #include "trace_subset.h"
 #include "trace_variant.h"
+#include "wide_triangles-inl.h"
 
 // What does not depend on the instruction set.
 #ifndef LSP_LANE_ORDERS
@@ -108,9 +109,7 @@ HWY_INLINE MF first_lanes(size_t count) { return hn::FirstN(df, count < kLanes ?
   for (Bits rest_##i = (bits); rest_##i != 0; rest_##i &= rest_##i - 1) \
     if (const auto i = static_cast<size_t>(std::countr_zero(rest_##i)); true)
 
-// lsp_min, lsp_max and floor(q > 0 ? q : 0), held below n: lsp_cell_patch.
-HWY_INLINE VF min_of(VF a, VF b) { return select(hn::Lt(b, a), b, a); }
-HWY_INLINE VF max_of(VF a, VF b) { return select(hn::Lt(a, b), b, a); }
+// floor(q > 0 ? q : 0), held below n: lsp_cell_patch.
 HWY_INLINE VF patch_of(VF q, VF n) {
   const VF i = hn::Floor(hn::IfThenElseZero(hn::Gt(q, hn::Zero(df)), q));
   return select(hn::Lt(i, n), i, hn::Sub(n, set(1.0f)));

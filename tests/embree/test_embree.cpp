@@ -60,8 +60,8 @@ class PaperScene : public testing::TestWithParam<const char*> {
   fs::path input_;
 };
 
-TEST_P(PaperScene, ExactAgreesWithEmbree) {
-  const OpenFile file(baked(input_));
+// Hits, closest and any, of rays from the surface of a file's scene.
+void expect_agreement(const OpenFile& file) {
   const Soup soup = soup_of(file.scene());
   const EmbreeScene embree(soup);
   const std::vector<LspRay> rays = surface_rays(soup, rays_per_scene(), 1);
@@ -89,6 +89,15 @@ TEST_P(PaperScene, ExactAgreesWithEmbree) {
     differ += (any[i].primitive == LSP_NONE) != (ours[i].primitive == LSP_NONE);
   }
   EXPECT_EQ(differ, 0u);
+}
+
+TEST_P(PaperScene, ExactAgreesWithEmbree) { expect_agreement(OpenFile(baked(input_))); }
+
+// The nodes of eight children that files of cells have.
+TEST_P(PaperScene, WideNodesAgreeWithEmbree) {
+  const OpenFile file(shared_bake(input_, {"--base", "wide"}, LSP_BAKES_DIR));
+  ASSERT_NE(file.scene().header->required_features & LSP_FEATURE_WIDE, 0u);
+  expect_agreement(file);
 }
 
 // Both base structures find the same nearest point of every ray, to the bit; where two triangles meet there,

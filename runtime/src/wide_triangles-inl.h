@@ -1,0 +1,181 @@
+// Triangles across lanes, four at a time: for trace_wide_lanes.cpp and wide_exact-inl.h. The test is
+// lsp_triangle (lsp/traverse.h), operation by operation: a lane has the bits of a single triangle.
+#if defined(LSP_WIDE_TRIANGLES_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef LSP_WIDE_TRIANGLES_INL_H
+#undef LSP_WIDE_TRIANGLES_INL_H
+#else
+#define LSP_WIDE_TRIANGLES_INL_H
+#endif
+
+#include <hwy/highway.h>
+#include <bit>
+#include <cmath>
+
+#include "trace_subset.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace lsp {
+namespace HWY_NAMESPACE {
+namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+using namespace subset;
+
+constexpr size_t kLeafLanes = 4;
+using D4 = hn::CappedTag<float, kLeafLanes>;
+using V4 = hn::Vec<D4>;
+using M4 = hn::Mask<D4>;
+constexpr D4 d4;
+
+template <class D>
+HWY_INLINE uint32_t mask_bits(D d, hn::Mask<D> mask) {
+  uint8_t bytes[8] = {};
+  hn::StoreMaskBits(d, mask, bytes);
+  return bytes[0];
+}
+
+// lsp_min and lsp_max, of a NaN as well: x86 takes the second where neither is less.
+template <class V>
+HWY_INLINE V min_of(V a, V b) {
+#if HWY_ARCH_X86
+  return hn::Min(b, a);
+#else
+  return hn::IfThenElse(hn::Lt(b, a), b, a);
+#endif
+}
+template <class V>
+HWY_INLINE V max_of(V a, V b) {
+#if HWY_ARCH_X86
+  return hn::Max(b, a);
+#else
+  return hn::IfThenElse(hn::Lt(a, b), b, a);
+#endif
+}
+
+struct P4 {
+  V4 x, y, z;
+};
+HWY_INLINE P4 minus(const P4& a, const P4& b) {
+  return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
+}
+HWY_INLINE P4 times(const P4& a, V4 b) { return {hn::Mul(a.x, b), hn::Mul(a.y, b), hn::Mul(a.z, b)}; }
+HWY_INLINE P4 select(M4 m, const P4& a, const P4& b) {
+  return {hn::IfThenElse(m, a.x, b.x), hn::IfThenElse(m, a.y, b.y), hn::IfThenElse(m, a.z, b.z)};
+}
+HWY_INLINE V4 dot(const P4& a, const P4& b) {
+  return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));
+}
+HWY_INLINE V4 largest(const P4& a) { return max_of(max_of(hn::Abs(a.x), hn::Abs(a.y)), hn::Abs(a.z)); }
+
+// lsp_plane_depth of four.
+HWY_INLINE V4 plane_depth(const P4& direction, V4 shear_z, const P4& a, const P4& b, const P4& c) {
+  const hn::RebindToUnsigned<D4> du;
+  const P4 ab = minus(b, a), bc = minus(c, b), ca = minus(a, c);
+  const V4 length_ab = largest(ab), length_bc = largest(bc), length_ca = largest(ca);
+  const M4 at_a = hn::And(hn::Ge(length_bc, length_ab), hn::Ge(length_bc, length_ca));
+  const M4 at_b = hn::Ge(length_ca, length_ab);
+  const P4 p = select(at_a, a, select(at_b, b, c));
+  const P4 e = select(at_a, ab, select(at_b, bc, ca));
+  const P4 f = select(at_a, ca, select(at_b, ab, bc));
+  const auto longest = hn::BitCast(du, max_of(max_of(length_ab, length_bc), length_ca));
+  const auto exponent =
+      hn::Min(hn::Max(hn::ShiftRight<23>(longest), hn::Set(du, uint32_t{1})), hn::Set(du, uint32_t{253}));
+  const V4 shrink = hn::BitCast(d4, hn::ShiftLeft<23>(hn::Sub(hn::Set(du, uint32_t{254}), exponent)));
+  const P4 g = times(e, shrink), h = times(f, shrink);
+  const P4 n = {hn::Sub(hn::Mul(g.y, h.z), hn::Mul(g.z, h.y)), hn::Sub(hn::Mul(g.z, h.x), hn::Mul(g.x, h.z)),
+                hn::Sub(hn::Mul(g.x, h.y), hn::Mul(g.y, h.x))};
+  const V4 t = hn::Div(dot(n, p), dot(n, direction));
+  const V4 za = hn::Mul(a.z, shear_z), zb = hn::Mul(b.z, shear_z), zc = hn::Mul(c.z, shear_z);
+  return min_of(max_of(max_of(za, zb), zc), max_of(min_of(min_of(za, zb), zc), t));
+}
+
+// Bytes of a corner whose axes are rotated so that the ray's comes last: lsp_rotate.
+alignas(16) constexpr uint8_t kRotations[3][16] = {
+    {4, 5, 6, 7, 8, 9, 10, 11, 0, 1, 2, 3, 12, 13, 14, 15},
+    {8, 9, 10, 11, 0, 1, 2, 3, 4, 5, 6, 7, 12, 13, 14, 15},
+    {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15},
+};
+using Bytes = hn::Vec<hn::Repartition<uint8_t, D4>>;
+HWY_INLINE V4 rotated(V4 v, Bytes by) {
+  return hn::BitCast(d4, hn::TableLookupBytes(hn::BitCast(hn::Repartition<uint8_t, D4>(), v), by));
+}
+
+// A ray as triangles take it, its axis last.
+struct RayRows {
+  const float *origin, *shear, *direction;
+  float tmin;
+  Bytes rotation;
+};
+
+// Of the triangles that the ray's line passes through, a bit each.
+template <class Best, class NumberOf>
+HWY_INLINE void keep_nearest(const lsp_scene& scene, const LspTriangle* const (&records)[kLeafLanes],
+                             uint32_t met, const RayRows& r, const P4& a, const P4& b, const P4& c, V4 v,
+                             V4 w, V4 det, NumberOf number_of, Best& best) {
+  const P4 direction = {hn::Set(d4, r.direction[0]), hn::Set(d4, r.direction[1]),
+                        hn::Set(d4, r.direction[2])};
+  const V4 t = plane_depth(direction, hn::Set(d4, r.shear[2]), a, b, c);
+  met &= mask_bits(d4, hn::And(hn::Gt(t, hn::Set(d4, r.tmin)), hn::Le(t, hn::Set(d4, best.t))));
+  if (met == 0) return;
+  HWY_ALIGN float ts[kLeafLanes], vs[kLeafLanes], ws[kLeafLanes], dets[kLeafLanes];
+  hn::Store(t, d4, ts);
+  hn::Store(v, d4, vs);
+  hn::Store(w, d4, ws);
+  hn::Store(det, d4, dets);
+  for (; met != 0; met &= met - 1) {
+    const auto lane = static_cast<uint32_t>(std::countr_zero(met));
+    const uint32_t primitive = records[lane]->primitive;
+    if (!(ts[lane] < best.t || (ts[lane] == best.t && primitive < best.primitive))) continue;
+    best.t = ts[lane];
+    best.u = vs[lane] / dets[lane];
+    best.v = ws[lane] / dets[lane];
+    best.triangle = number_of(lane);
+    best.primitive = primitive;
+    if (scene.normals != nullptr) fetch(scene.normals, best.triangle);
+  }
+}
+
+// Of `count` records of the four; number_of a lane is that of its record.
+template <class Best, class NumberOf>
+HWY_INLINE void hit_triangles(const lsp_scene& scene, const LspTriangle* const (&records)[kLeafLanes],
+                              uint32_t count, const RayRows& r, NumberOf number_of, Best& best) {
+  // Seen from the origin, the ray's axis last.
+  const auto corner = [&](size_t c) HWY_ATTR {
+    const auto row = [&](size_t i) HWY_ATTR {
+      return rotated(hn::LoadU(d4, reinterpret_cast<const float*>(records[i]) + 4 * c), r.rotation);
+    };
+    const V4 a = row(0), b = row(1), e = row(2), f = row(3);
+    const hn::Repartition<uint64_t, D4> d64;
+    const auto pair = [&](V4 v) HWY_ATTR { return hn::BitCast(d64, v); };
+    const auto ab_low = pair(hn::InterleaveLower(d4, a, b)), ef_low = pair(hn::InterleaveLower(d4, e, f));
+    const auto ab_high = pair(hn::InterleaveUpper(d4, a, b)), ef_high = pair(hn::InterleaveUpper(d4, e, f));
+    const V4 x = hn::BitCast(d4, hn::InterleaveLower(d64, ab_low, ef_low));
+    const V4 y = hn::BitCast(d4, hn::InterleaveUpper(d64, ab_low, ef_low));
+    const V4 z = hn::BitCast(d4, hn::InterleaveLower(d64, ab_high, ef_high));
+    return P4{hn::Sub(x, hn::Set(d4, r.origin[0])), hn::Sub(y, hn::Set(d4, r.origin[1])),
+              hn::Sub(z, hn::Set(d4, r.origin[2]))};
+  };
+  const P4 a = corner(0), b = corner(1), c = corner(2);
+  const V4 shear_x = hn::Set(d4, r.shear[0]), shear_y = hn::Set(d4, r.shear[1]);
+  const V4 ax = hn::Sub(a.x, hn::Mul(shear_x, a.z)), ay = hn::Sub(a.y, hn::Mul(shear_y, a.z));
+  const V4 bx = hn::Sub(b.x, hn::Mul(shear_x, b.z)), by = hn::Sub(b.y, hn::Mul(shear_y, b.z));
+  const V4 cx = hn::Sub(c.x, hn::Mul(shear_x, c.z)), cy = hn::Sub(c.y, hn::Mul(shear_y, c.z));
+  const V4 u = hn::Sub(hn::Mul(cx, by), hn::Mul(cy, bx));
+  const V4 v = hn::Sub(hn::Mul(ax, cy), hn::Mul(ay, cx));
+  const V4 w = hn::Sub(hn::Mul(bx, ay), hn::Mul(by, ax));
+  const V4 zero = hn::Zero(d4);
+  const V4 det = hn::Add(hn::Add(u, v), w);
+  // Of a NaN among them the determinant is one.
+  const M4 below = hn::Lt(hn::Min(hn::Min(u, v), w), zero), above = hn::Gt(hn::Max(hn::Max(u, v), w), zero);
+  // Finite and not zero; no number is neither less.
+  const M4 sound = hn::And(hn::Lt(hn::Abs(det), hn::Set(d4, HUGE_VALF)), hn::Gt(hn::Abs(det), zero));
+  const uint32_t met = mask_bits(d4, hn::AndNot(hn::And(below, above), sound)) & ((1u << count) - 1);
+  if (met != 0) keep_nearest(scene, records, met, r, a, b, c, v, w, det, number_of, best);
+}
+
+}  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace lsp
+HWY_AFTER_NAMESPACE();
+
+#endif
