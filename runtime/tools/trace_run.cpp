@@ -116,7 +116,9 @@ TraceReport trace_on_cpu(const TraceTarget& target, const TraceRequest& request,
 // Puts what is traced on the tracer's device.
 void load_target(VulkanTracer& tracer, const TraceTarget& target, const TraceRequest& request) {
   const bool approximate = (request.options.flags & LSP_TRACE_APPROXIMATE) != 0;
-  const uint32_t uses = approximate ? LSP_USE_APPROXIMATE : LSP_USE_EXACT;
+  uint32_t uses = approximate ? LSP_USE_APPROXIMATE : LSP_USE_EXACT;
+  if (approximate && target.scene != nullptr && lsp_dial(target.scene, &request.options) == LSP_DIAL_TABLES)
+    uses = LSP_USE_TABLES;
   if (target.instances != nullptr)
     tracer.load(std::span(target.instances->assets, target.instances->asset_count), uses, request.load_path);
   else
