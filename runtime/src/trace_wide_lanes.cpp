@@ -21,6 +21,7 @@
 
 // Without vectors there is the loop of trace_wide.cpp.
 #if HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_EMU128
+#include "trace_loops.h"
 #include "trace_subset.h"
 #include "trace_variant.h"
 
@@ -147,7 +148,7 @@ class Tracer {
   HWY_INLINE LspHit trace(const LspRay& ray, uint32_t flags) {
     const Text::LspSetup s = Text::lsp_setup(scene_, ray);
     if (!s.valid) return Text::lsp_no_hit();
-    if (!tame_ || !is_tame(s.origin)) return trace_singly(s, ray, flags);
+    if (!tame_ || !is_tame(s.origin)) return trace_singly(ray, flags);
     Text::LspBest best = Text::lsp_no_best(s);
     best.complete = node_count_ == 0 || walk<kAny>(s, best);
     return Text::lsp_finish(scene_, s, ray, best, flags);
@@ -156,11 +157,10 @@ class Tracer {
  private:
   static bool is_tame(const vec3& v) { return Text::lsp_largest(v) < kTame; }
 
-  HWY_NOINLINE LspHit trace_singly(const Text::LspSetup& s, const LspRay& ray, uint32_t flags) {
-    Text text;
-    return text
-        .lsp_trace_ready(scene_, s, {flags & (LSP_TRACE_ANY_HIT | LSP_TRACE_OCCLUSION), 0, false, 0}, ray)
-        .hit;
+  LspHit trace_singly(const LspRay& ray, uint32_t flags) const {
+    LspHit hit;
+    solid::trace_wide(scene_, flags, 0, &ray, &hit, 1, nullptr);
+    return hit;
   }
 
   // A ray as boxes take it: by axis the planes it meets first and last (byte of LspWideNode.planes), and from
