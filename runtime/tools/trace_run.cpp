@@ -117,8 +117,10 @@ TraceReport trace_on_cpu(const TraceTarget& target, const TraceRequest& request,
 void load_target(VulkanTracer& tracer, const TraceTarget& target, const TraceRequest& request) {
   const bool approximate = (request.options.flags & LSP_TRACE_APPROXIMATE) != 0;
   uint32_t uses = approximate ? LSP_USE_APPROXIMATE : LSP_USE_EXACT;
-  if (approximate && target.scene != nullptr && lsp_dial(target.scene, &request.options) == LSP_DIAL_TABLES)
-    uses = LSP_USE_TABLES;
+  if (target.scene != nullptr) {
+    if (approximate && lsp_dial(target.scene, &request.options) == LSP_DIAL_TABLES) uses = LSP_USE_TABLES;
+    if ((request.options.flags & LSP_TRACE_OCCLUSION) != 0) uses |= LSP_USE_OCCLUSION;
+  }
   if (target.instances != nullptr)
     tracer.load(std::span(target.instances->assets, target.instances->asset_count), uses, request.load_path);
   else
