@@ -63,3 +63,9 @@ extern "C" void lsp_unmap_file(lsp_mapping* mapping) {
   mapping->bytes = nullptr;
   mapping->size = 0;
 }
+
+extern "C" void lsp_release_pages(const lsp_mapping* mapping) {
+  // Of a file, not of memory: what is dropped is still there. Where the system refuses nothing is lost.
+  if (mapping->bytes != nullptr)
+    madvise(const_cast<void*>(mapping->bytes), static_cast<size_t>(mapping->size), MADV_DONTNEED);
+}

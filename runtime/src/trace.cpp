@@ -96,8 +96,8 @@ extern "C" lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options*
       return LSP_OK;
     }
 #endif
-    const lsp::WideLoops& loops = partial ? lsp::partial::kWideLoops : lsp::solid::kWideLoops;
-    loops.of[any_hit ? 1 : 0](*scene, 0, rays, hits, count, counts);
+    (partial ? lsp::partial::trace_wide : lsp::solid::trace_wide)(*scene, flags, 0, rays, hits, count,
+                                                                  counts);
     return LSP_OK;
   }
   flags &= approximate ? LSP_TRACE_ALL_FLAGS : LSP_TRACE_ANY_HIT;
@@ -105,6 +105,6 @@ extern "C" lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options*
   const bool ntree = scene->header->base_structure == LSP_BASE_NTREE;
   const lsp::TraceLoops& loops = partial ? (ntree ? lsp::partial::kNTreeLoops : lsp::partial::kBvhLoops)
                                          : (ntree ? lsp::solid::kNTreeLoops : lsp::solid::kBvhLoops);
-  loops.of[flags](*scene, options->lod, rays, hits, count, counts);
+  (approximate ? loops.approximate : loops.exact)(*scene, flags, options->lod, rays, hits, count, counts);
   return LSP_OK;
 }

@@ -18,6 +18,6 @@ struct BvhTraversal {
 
 }  // namespace
 
-const TraceLoops kBvhLoops = loops_of<BvhTraversal>();
+const TraceLoops kBvhLoops = {trace_singly<BvhTraversal>, trace_group<BvhTraversal>};
 
 }  // namespace lsp::LSP_VARIANT

@@ -14,23 +14,17 @@ struct CellsTraversal {
 #undef LSP_CELLS
 };
 
-template <uint32_t kFlags>
-LSP_CLONES void trace(const lsp_scene& scene, uint32_t dial, const LspRay* rays, LspHit* hits, uint64_t count,
-                      lsp_trace_counts* counts) {
+}  // namespace
+
+LSP_CLONES void trace_cells(const lsp_scene& scene, bool any_hit, uint32_t dial, const LspRay* rays,
+                            LspHit* hits, uint64_t count, lsp_trace_counts* counts) {
   CellsTraversal traversal;
+  const uint32_t flags = LSP_TRACE_APPROXIMATE | (any_hit ? LSP_TRACE_ANY_HIT : 0u);
   for (uint64_t i = 0; i < count; ++i) {
-    const auto traced = traversal.lsp_trace_ray(scene, rays[i], kFlags, 0, dial);
+    const auto traced = traversal.lsp_trace_ray(scene, rays[i], flags, 0, dial);
     hits[i] = traced.hit;
     add(counts, traced);
   }
-}
-
-}  // namespace
-
-void trace_cells(const lsp_scene& scene, bool any_hit, uint32_t dial, const LspRay* rays, LspHit* hits,
-                 uint64_t count, lsp_trace_counts* counts) {
-  (any_hit ? trace<LSP_TRACE_APPROXIMATE | LSP_TRACE_ANY_HIT>
-           : trace<LSP_TRACE_APPROXIMATE>)(scene, dial, rays, hits, count, counts);
 }
 
 }  // namespace lsp::LSP_VARIANT

@@ -14,19 +14,17 @@
 // and 0.97 to 1.2 times shuffled in a BVH, in an NTree 0.8 to 1.0 times.
 #pragma once
 
-#include <utility>
-
 #include "trace_loops.h"
 #include "trace_subset.h"
 
-// Compiled for each of these instruction sets, chosen when the program is loaded; nothing is contracted, so
-// that all give the same bits. What they bring are registers, population counts and three operands: with
-// AVX-512 1.09 to 1.23 times as fast on five meshes, exact and approximate. (Boxes tested four wide with
-// intrinsics were slower, one function with all ten loops by a third.) Not in clang, which takes no address
-// of a template's clones, not under a sanitizer, whose run time is not up yet when the loader chooses, and
-// not where nothing is optimised.
-#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__OPTIMIZE__) && !defined(__clang__) && \
-    !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+// Where there are no loops with vectors (LSP_SIMD), those of cells and wide nodes are compiled for each of
+// these instruction sets, chosen when the program is loaded; nothing is contracted, so that all give the same
+// bits. What they bring are registers, population counts and three operands: with AVX-512 1.09 to 1.23 times
+// as fast on five meshes, exact and approximate, for three times the code: too much for what is traced
+// rarely. Not in clang, which takes no address of a template's clones, not under a sanitizer, whose run time
+// is not up yet when the loader chooses, and not where nothing is optimised.
+#if !defined(LSP_SIMD) && defined(__x86_64__) && defined(__gnu_linux__) && defined(__OPTIMIZE__) && \
+    !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define LSP_CLONES __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
 #else
 #define LSP_CLONES
@@ -34,14 +32,15 @@
 
 namespace lsp {
 
-// The few rays from far away have code of their own: without them the other's is 1.07 to 1.12 times as fast.
-// A shader has one loop, for a device may run both.
-template <class Traversal, uint32_t kFlags>
-__attribute__((noinline)) typename Traversal::LspTraced trace_far(const lsp_scene& scene,
-                                                                  const typename Traversal::LspSetup& s,
-                                                                  float lod, const LspRay& ray) {
-  Traversal traversal;
-  return traversal.lsp_trace_ready(scene, s, {kFlags, lod, true, 0}, ray);
+// What happens once a ray: no loop needs a copy of its own.
+template <class Traversal>
+__attribute__((noinline)) typename Traversal::LspSetup set_up(const lsp_scene& scene, const LspRay& ray) {
+  return Traversal::lsp_setup(scene, ray);
+}
+template <class Traversal>
+__attribute__((noinline)) LspHit finish(const lsp_scene& scene, const typename Traversal::LspSetup& s,
+                                        const LspRay& ray, const typename Traversal::LspBest& best) {
+  return Traversal::lsp_finish(scene, s, ray, best, 0);
 }
 
 template <class Traced>
@@ -58,16 +57,32 @@ LSP_INLINE inline void add(lsp_trace_counts* sums, const Traced& traced) {
   sums->exact_nodes += traced.counts.exact_nodes;
 }
 
-template <class Traversal, uint32_t kFlags>
-LSP_CLONES void trace_singly(const lsp_scene& scene, float lod, const LspRay* rays, LspHit* hits,
-                             uint64_t count, lsp_trace_counts* counts) {
+// Traces the few rays that a base structure treats apart, by code of their own: without them the other's
+// is 1.07 to 1.12 times as fast. A shader has one loop, for a device may run both. False: the ray is not one
+// of these.
+template <class Traversal>
+LSP_INLINE inline bool trace_if_far(const lsp_scene& scene, const typename Traversal::LspSetup& s,
+                                    uint32_t flags, float lod, const LspRay& ray, LspHit& hit,
+                                    lsp_trace_counts* counts) {
+  if constexpr (requires { Traversal::trace_far; }) {
+    if (!Traversal::lsp_is_far(scene, s)) return false;
+    Traversal::trace_far(scene, flags, lod, ray, hit, counts);
+    return true;
+  }
+  return false;
+}
+
+// Exact rays.
+template <class Traversal>
+LSP_INLINE inline void trace_singly(const lsp_scene& scene, uint32_t flags, float lod, const LspRay* rays,
+                                    LspHit* hits, uint64_t count, lsp_trace_counts* counts) {
   Traversal traversal;
+  flags &= LSP_TRACE_ANY_HIT;
   for (uint64_t i = 0; i < count; ++i) {
-    const typename Traversal::LspSetup s = Traversal::lsp_setup(scene, rays[i]);
-    const auto traced = !s.valid ? Traversal::lsp_invalid_ray()
-                        : Traversal::lsp_is_far(scene, s)
-                            ? trace_far<Traversal, kFlags>(scene, s, lod, rays[i])
-                            : traversal.lsp_trace_ready(scene, s, {kFlags, lod, false, 0}, rays[i]);
+    const typename Traversal::LspSetup s = set_up<Traversal>(scene, rays[i]);
+    if (s.valid && trace_if_far<Traversal>(scene, s, flags, lod, rays[i], hits[i], counts)) continue;
+    const auto traced = s.valid ? traversal.lsp_trace_ready(scene, s, {flags, lod, false, 0}, rays[i])
+                                : Traversal::lsp_invalid_ray();
     hits[i] = traced.hit;
     add(counts, traced);
   }
@@ -123,35 +138,32 @@ struct Waiting : Traversal {
 
 constexpr uint32_t kGroup = 16;
 
-template <class Traversal, uint32_t kFlags>
-LSP_CLONES void trace_group(const lsp_scene& scene, float lod, const LspRay* rays, LspHit* hits,
-                            uint64_t count, lsp_trace_counts* counts) {
+template <class Traversal>
+void trace_group(const lsp_scene& scene, uint32_t flags, float lod, const LspRay* rays, LspHit* hits,
+                 uint64_t count, lsp_trace_counts* counts) {
   using Ray = Waiting<Traversal>;
-  const typename Traversal::LspQuery q{kFlags, lod, false, 0};
+  const typename Traversal::LspQuery q{flags | LSP_TRACE_APPROXIMATE, lod, false, 0};
   Ray group[kGroup];
   static_assert(sizeof group <= 20 * 1024);
   // Numbers of rays of the group: those that go on, and what those wait for that went on.
   uint8_t on[kGroup], leaves[kGroup], look_ups[kGroup], done[kGroup];
   uint32_t on_count = 0;
   uint64_t next = 0;
-  const auto finish = [&](const typename Traversal::LspTraced& traced, uint64_t ray) LSP_INLINE {
+  const auto answer = [&](const typename Traversal::LspTraced& traced, uint64_t ray) {
     hits[ray] = traced.hit;
     add(counts, traced);
   };
-  const auto end = [&](Ray& r) LSP_INLINE {
-    finish({Traversal::lsp_finish(scene, r.s, rays[r.ray], r.lsp_end(scene), 0), r.lsp_walk.counts, true},
-           r.ray);
+  const auto end = [&](Ray& r) {
+    answer({finish<Traversal>(scene, r.s, rays[r.ray], r.lsp_end(scene)), r.lsp_walk.counts, true}, r.ray);
   };
   // The next ray that has something to visit.
-  const auto begin = [&](Ray& r) LSP_INLINE {
+  const auto begin = [&](Ray& r) {
     while (next < count) {
       r.ray = next++;
-      r.s = Traversal::lsp_setup(scene, rays[r.ray]);
+      r.s = set_up<Traversal>(scene, rays[r.ray]);
       if (!r.s.valid) {
-        finish(Traversal::lsp_invalid_ray(), r.ray);
-      } else if (Traversal::lsp_is_far(scene, r.s)) {
-        finish(trace_far<Traversal, kFlags>(scene, r.s, lod, rays[r.ray]), r.ray);
-      } else {
+        answer(Traversal::lsp_invalid_ray(), r.ray);
+      } else if (!trace_if_far<Traversal>(scene, r.s, q.flags, lod, rays[r.ray], hits[r.ray], counts)) {
         r.lsp_begin(scene, r.s, q);
         if (r.lsp_walk.ref != LSP_NONE) return true;
         end(r);
@@ -190,28 +202,6 @@ LSP_CLONES void trace_group(const lsp_scene& scene, float lod, const LspRay* ray
       on[on_count++] = look_ups[i];
     }
   }
-}
-
-// The loop for flags that go together.
-template <class Traversal, uint32_t kFlags>
-constexpr TraceLoop loop_of() {
-  constexpr uint32_t kBothNear = LSP_TRACE_NEAR_APPROXIMATE | LSP_TRACE_NEAR_SKIP;
-  if constexpr ((kFlags & LSP_TRACE_APPROXIMATE) == 0)
-    return (kFlags & ~LSP_TRACE_ANY_HIT) == 0 ? trace_singly<Traversal, kFlags & LSP_TRACE_ANY_HIT> : nullptr;
-  else if constexpr ((kFlags & kBothNear) != kBothNear)
-    return trace_group<Traversal, kFlags>;
-  else
-    return nullptr;
-}
-
-template <class Traversal, uint32_t... kFlags>
-constexpr TraceLoops loops_of(std::integer_sequence<uint32_t, kFlags...>) {
-  return {{loop_of<Traversal, kFlags>()...}};
-}
-
-template <class Traversal>
-constexpr TraceLoops loops_of() {
-  return loops_of<Traversal>(std::make_integer_sequence<uint32_t, LSP_TRACE_ALL_FLAGS + 1>());
 }
 
 }  // namespace lsp

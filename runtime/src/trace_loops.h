@@ -5,28 +5,28 @@
 
 namespace lsp {
 
-// Adds to *counts unless it is null.
-using TraceLoop = void (*)(const lsp_scene&, float lod, const LspRay*, LspHit*, uint64_t count,
-                           lsp_trace_counts* counts);
+// Adds to *counts unless it is null. `flags`: LSP_TRACE_*, those that mean something together.
+using TraceLoop = void (*)(const lsp_scene&, uint32_t flags, float lod, const LspRay*, LspHit*,
+                           uint64_t count, lsp_trace_counts* counts);
 
-// The loops by LSP_TRACE_* flags; null: flags that exclude each other.
+// Of a base structure: for exact rays and for approximate ones.
 struct TraceLoops {
-  TraceLoop of[LSP_TRACE_ALL_FLAGS + 1];
-};
-
-// Of exact rays through wide nodes: for the closest hit, for any.
-struct WideLoops {
-  TraceLoop of[2];
+  TraceLoop exact, approximate;
 };
 
 // Of scenes whose triangles are solid, and of those where some are there in part.
 namespace solid {
 extern const TraceLoops kBvhLoops, kNTreeLoops;
-extern const WideLoops kWideLoops;
+void trace_wide(const lsp_scene&, uint32_t flags, float lod, const LspRay*, LspHit*, uint64_t count,
+                lsp_trace_counts* counts);  // exact rays through wide nodes
 }  // namespace solid
 namespace partial {
 extern const TraceLoops kBvhLoops, kNTreeLoops;
-extern const WideLoops kWideLoops;
+void trace_wide(const lsp_scene&, uint32_t flags, float lod, const LspRay*, LspHit*, uint64_t count,
+                lsp_trace_counts* counts);
+// A valid ray from so far away that an NTree treats it apart, of scenes of either kind.
+void trace_far_in_ntree(const lsp_scene&, uint32_t flags, float lod, const LspRay&, LspHit&,
+                        lsp_trace_counts* counts);
 }  // namespace partial
 
 }  // namespace lsp

@@ -11,6 +11,8 @@ struct NTreeTraversal {
 #include "lsp/traverse.h"
 #undef LSP_NTREE
 
+  static constexpr auto trace_far = partial::trace_far_in_ntree;
+
   LSP_STEP void fetch_leaf(const lsp_scene& scene) const {
     fetch(scene.references, lsp_walk.ref & ~LSP_LEAF_BIT);
   }
@@ -24,6 +26,6 @@ struct NTreeTraversal {
 
 }  // namespace
 
-const TraceLoops kNTreeLoops = loops_of<NTreeTraversal>();
+const TraceLoops kNTreeLoops = {trace_singly<NTreeTraversal>, trace_group<NTreeTraversal>};
 
 }  // namespace lsp::LSP_VARIANT

@@ -17,7 +17,9 @@ struct WideTraversal {
 
 }  // namespace
 
-const WideLoops kWideLoops = {
-    {trace_singly<WideTraversal, 0>, trace_singly<WideTraversal, LSP_TRACE_ANY_HIT>}};
+LSP_CLONES void trace_wide(const lsp_scene& scene, uint32_t flags, float lod, const LspRay* rays,
+                           LspHit* hits, uint64_t count, lsp_trace_counts* counts) {
+  trace_singly<WideTraversal>(scene, flags, lod, rays, hits, count, counts);
+}
 
 }  // namespace lsp::LSP_VARIANT

@@ -22,6 +22,7 @@
 
 // Without vectors there is the loop of trace_wide.cpp.
 #if HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_EMU128
+#include "trace_loops.h"
 #include "trace_subset.h"
 #include "trace_variant.h"
 #include "wide_triangles-inl.h"
@@ -173,13 +174,10 @@ class Tracer {
   static bool is_tame(const vec3& v) { return Text::lsp_largest(v) < kTame; }
 
   // Invalid rays, and those whose products may overflow.
-  HWY_NOINLINE LspHit trace_singly(const LspRay& ray, uint32_t flags) {
-    const Text::LspSetup s = Text::lsp_setup(scene_, ray);
-    if (!s.valid) return Text::lsp_no_hit();
-    Text text;
-    return text
-        .lsp_trace_ready(scene_, s, {flags & (LSP_TRACE_ANY_HIT | LSP_TRACE_OCCLUSION), 0, false, 0}, ray)
-        .hit;
+  LspHit trace_singly(const LspRay& ray, uint32_t flags) const {
+    LspHit hit;
+    solid::trace_wide(scene_, flags, 0, &ray, &hit, 1, nullptr);
+    return hit;
   }
 
   struct P8 {

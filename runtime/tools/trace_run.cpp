@@ -116,7 +116,11 @@ TraceReport trace_on_cpu(const TraceTarget& target, const TraceRequest& request,
 // Puts what is traced on the tracer's device.
 void load_target(VulkanTracer& tracer, const TraceTarget& target, const TraceRequest& request) {
   const bool approximate = (request.options.flags & LSP_TRACE_APPROXIMATE) != 0;
-  const uint32_t uses = approximate ? LSP_USE_APPROXIMATE : LSP_USE_EXACT;
+  uint32_t uses = approximate ? LSP_USE_APPROXIMATE : LSP_USE_EXACT;
+  if (target.scene != nullptr) {
+    if (approximate && lsp_dial(target.scene, &request.options) == LSP_DIAL_TABLES) uses = LSP_USE_TABLES;
+    if ((request.options.flags & LSP_TRACE_OCCLUSION) != 0) uses |= LSP_USE_OCCLUSION;
+  }
   if (target.instances != nullptr)
     tracer.load(std::span(target.instances->assets, target.instances->asset_count), uses, request.load_path);
   else

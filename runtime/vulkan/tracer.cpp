@@ -176,11 +176,11 @@ class Pipelines {
   }
   Pipelines(const Pipelines&) = delete;
   Pipelines& operator=(const Pipelines&) = delete;
-  // `parts` of the shader are needed.
-  VkPipeline get(lsp_vulkan_plan plan, bool counting, uint32_t flags, uint32_t parts) {
-    if ((flags & LSP_TRACE_APPROXIMATE) == 0) plan.base_structure = plan.exact_structure;
-    VkPipeline& pipeline = made_[{plan.base_structure, plan.addresses, counting, flags, parts}];
-    if (pipeline == VK_NULL_HANDLE) pipeline = shader_.create_pipeline(plan, counting, flags, stack_, parts);
+  VkPipeline get(lsp_vulkan_plan plan, bool counting, const lsp_vulkan_kind& kind) {
+    plan.base_structure = kind.base_structure;
+    VkPipeline& pipeline = made_[{kind.base_structure, plan.addresses, counting, kind.flags, kind.parts}];
+    if (pipeline == VK_NULL_HANDLE)
+      pipeline = shader_.create_pipeline(plan, counting, kind.flags, stack_, kind.parts);
     return pipeline;
   }
 
@@ -272,8 +272,8 @@ class VulkanTracer::Impl {
 
   VulkanOptions options_;
   uint32_t uses_ = 0;
-  std::string name_;   // of the scene that is being loaded, before what is wrong with it
-  uint32_t dial_ = 0;  // of the trace in progress; 0: it has none
+  std::string name_;        // of the scene that is being loaded, before what is wrong with it
+  lsp_vulkan_kind kind_{};  // of the trace in progress
   std::unique_ptr<Shader> shader_;
   std::unique_ptr<Pipelines> pipelines_;
   Buffer counters_;
@@ -306,7 +306,8 @@ void VulkanTracer::Impl::attach(const lsp_scene& scene, SceneBuffers&& buffers, 
   try {
     const LspRay ray{scene.header->bounds_min, 0.0f, {1.0f, 1.0f, 1.0f}, 3.402823e38f};
     LspHit hit;
-    const uint32_t flags = (uses_ & LSP_USE_EXACT) != 0 ? 0 : LSP_TRACE_APPROXIMATE;
+    const uint32_t flags = ((uses_ & LSP_USE_EXACT) != 0 ? 0u : LSP_TRACE_APPROXIMATE) |
+                           ((uses_ & LSP_USE_OCCLUSION) != 0 ? LSP_TRACE_OCCLUSION : 0u);
     trace({flags, 0.0f, 0, 0.0f}, {&ray, 1}, {&hit, 1}, false, loaded.size() - 1);
   } catch (...) {
     loaded.pop_back();
@@ -402,12 +403,10 @@ void VulkanTracer::Impl::record_batch(const Loaded& scene, const lsp_trace_optio
     vk.vkCmdResetQueryPool(commands, shader_->timer, 0, 2);
     vk.vkCmdWriteTimestamp(commands, kCompute, shader_->timer, 0);
   }
-  const lsp_vulkan_trace_constants constants{options.lod, 0, count, dial_};
-  uint32_t parts = lsp_vulkan_parts(&scene.scene);
-  if (dial_ == LSP_DIAL_TABLES) parts &= ~LSP_PART_CELL_EXACT;  // of cells the tables alone answer
+  const lsp_vulkan_trace_constants constants{options.lod, 0, count, kind_.dial};
   lsp_vulkan_record_trace(&device->functions, commands,
-                          pipelines_->get(scene.buffers.plan(), counting, options.flags, parts),
-                          shader_->layout, shader_->set, &constants);
+                          pipelines_->get(scene.buffers.plan(), counting, kind_), shader_->layout,
+                          shader_->set, &constants);
   if (shader_->timer != VK_NULL_HANDLE) vk.vkCmdWriteTimestamp(commands, kCompute, shader_->timer, 1);
   if (batch_.staged()) {
     record_barrier(*device, commands, kCompute, VK_ACCESS_SHADER_WRITE_BIT, kTransfer,
@@ -450,26 +449,16 @@ void VulkanTracer::Impl::retrace(const lsp_scene& scene, const lsp_trace_options
   }
 }
 
-VulkanTrace VulkanTracer::Impl::trace(const lsp_trace_options& wanted, std::span<const LspRay> rays,
+VulkanTrace VulkanTracer::Impl::trace(const lsp_trace_options& options, std::span<const LspRay> rays,
                                       std::span<LspHit> hits, bool count, size_t number) {
-  const uint32_t needed = (wanted.flags & LSP_TRACE_APPROXIMATE) != 0 ? LSP_USE_APPROXIMATE : LSP_USE_EXACT;
-  if (number >= loaded.size() || (uses_ & needed) != needed)
+  if (number >= loaded.size())
     throw Failure(Exit::kUnsupported, "", "the scene is not loaded for this kind of trace");
   if (hits.size() != rays.size()) throw Failure(Exit::kInternal, "", "as many hits as rays are needed");
   const Loaded& scene = loaded[number];
-  // Flags that have no meaning together make no pipeline of their own.
-  lsp_trace_options options = wanted;
-  constexpr uint32_t kAny = LSP_TRACE_ANY_HIT | LSP_TRACE_OCCLUSION;
-  options.flags &= (wanted.flags & LSP_TRACE_APPROXIMATE) != 0 ? LSP_TRACE_ALL_FLAGS | kAny : kAny;
-  if ((options.flags & LSP_TRACE_OCCLUSION) != 0) options.flags |= LSP_TRACE_ANY_HIT;
-  if ((options.flags & LSP_TRACE_NEAR_APPROXIMATE) != 0) options.flags &= ~LSP_TRACE_NEAR_SKIP;
-  dial_ = 0;
-  // Wide nodes alone answer every ray exactly: the same pipeline.
-  if (scene.scene.header->base_structure == LSP_BASE_WIDE) options.flags &= kAny;
-  if ((scene.scene.header->required_features & LSP_FEATURE_CELLS) != 0) {
-    options.flags &= LSP_TRACE_APPROXIMATE | kAny;
-    if ((options.flags & LSP_TRACE_APPROXIMATE) != 0) dial_ = lsp_dial(&scene.scene, &wanted);
-  }
+  lsp_error error;
+  const lsp_status status =
+      lsp_vulkan_plan_trace(&scene.scene, &scene.buffers.plan(), &options, &kind_, &error);
+  if (status != LSP_OK) throw Failure(static_cast<Exit>(status), "", error.message);
   const auto start = std::chrono::steady_clock::now();
   VulkanTrace result;
   const uint32_t most = std::min(lsp_vulkan_max_rays(&device->limits), kBatchRays);
@@ -495,8 +484,12 @@ VulkanTrace VulkanTracer::Impl::trace(const lsp_trace_options& wanted, std::span
     }
     ++result.batches;
   }
-  options.flags |= wanted.flags & LSP_TRACE_MAX_LOSS;
-  retrace(scene.scene, options, rays, hits, count, result);
+  lsp_trace_options again = options;
+  if (kind_.dial == LSP_DIAL_TABLES) {  // perhaps because no more is loaded
+    again.flags |= LSP_TRACE_MAX_LOSS;
+    again.max_loss = 100;
+  }
+  retrace(scene.scene, again, rays, hits, count, result);
   result.counts.rays = rays.size();  // those retraced are not counted twice
   result.seconds = seconds_since(start);
   return result;

@@ -194,6 +194,8 @@ std::optional<View> view_of_hall(const RenderScene& scene, RayTracer& tracer, co
 
 }  // namespace
 
+glm::vec3 named_up(const std::string& axis) { return axis == "z" ? glm::vec3(0, 0, 1) : glm::vec3(0, 1, 0); }
+
 glm::mat3 axes(glm::vec3 up) {
   const glm::vec3 right(1, 0, 0);
   return {right, up, glm::cross(right, up)};

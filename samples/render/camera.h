@@ -27,6 +27,9 @@ std::string to_string(const Camera& camera);
 // Parses "WIDTHxHEIGHT", in pixels. Throws lsp::Failure (kUsage).
 glm::ivec2 parse_size(const std::string& text);
 
+// The axis that --up names: y or z.
+glm::vec3 named_up(const std::string& axis);
+
 // Right, up and towards the viewer, of a scene whose `up` is y or z.
 glm::mat3 axes(glm::vec3 up);
 

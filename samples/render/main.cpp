@@ -35,8 +35,6 @@ struct Arguments {
   RenderOptions options;
 };
 
-glm::vec3 named_up(const std::string& axis) { return axis == "z" ? glm::vec3(0, 0, 1) : glm::vec3(0, 1, 0); }
-
 Sky parse_sun(const std::string& text) {
   Sky sky;
   if (text.empty()) return sky;

@@ -13,11 +13,6 @@ constexpr float kHalfPi = 1.57079632679489662f;
 constexpr float kRadPerPixel = 0.004f;
 constexpr float kLosses[] = {0.0f, 0.1f, 0.2f, 0.5f, 1.0f, 2.0f, 5.0f, 10.0f, 20.0f, 50.0f, 100.0f};
 
-glm::vec3 direction(float yaw_rad, float pitch_rad) {
-  return {std::cos(pitch_rad) * std::sin(yaw_rad), std::sin(pitch_rad),
-          -std::cos(pitch_rad) * std::cos(yaw_rad)};
-}
-
 }  // namespace
 
 const char* const kControlsHelp =
@@ -36,8 +31,8 @@ float next_max_loss(float percent, bool looser) {
 }
 
 Controls::Controls(GLFWwindow* window, const Camera& camera, float diagonal)
-    : window_(window), speed_(0.1f * diagonal), last_seconds_(glfwGetTime()) {
-  const glm::vec3 forward = glm::normalize(camera.target - camera.eye);
+    : window_(window), axes_(axes(camera.up)), speed_(0.1f * diagonal), last_seconds_(glfwGetTime()) {
+  const glm::vec3 forward = glm::transpose(axes_) * glm::normalize(camera.target - camera.eye);
   yaw_rad_ = std::atan2(forward.x, -forward.z);
   pitch_rad_ = std::asin(std::clamp(forward.y, -1.0f, 1.0f));
   glfwSetWindowUserPointer(window, this);
@@ -55,18 +50,23 @@ void Controls::on_scroll(GLFWwindow* window, double, double y) {
       std::exp2(0.25f * static_cast<float>(y));
 }
 
+glm::vec3 Controls::direction() const {
+  return axes_ * glm::vec3(std::cos(pitch_rad_) * std::sin(yaw_rad_), std::sin(pitch_rad_),
+                           -std::cos(pitch_rad_) * std::cos(yaw_rad_));
+}
+
 bool Controls::is_down(int key) const { return glfwGetKey(window_, key) == GLFW_PRESS; }
 
 bool Controls::fly(ViewState& state, float seconds) {
-  const glm::vec3 forward = direction(yaw_rad_, pitch_rad_);
-  const glm::vec3 right(std::cos(yaw_rad_), 0.0f, std::sin(yaw_rad_));
+  const glm::vec3 forward = direction();
+  const glm::vec3 right = axes_ * glm::vec3(std::cos(yaw_rad_), 0.0f, std::sin(yaw_rad_));
   glm::vec3 way(0.0f);
   if (is_down(GLFW_KEY_W)) way += forward;
   if (is_down(GLFW_KEY_S)) way -= forward;
   if (is_down(GLFW_KEY_D)) way += right;
   if (is_down(GLFW_KEY_A)) way -= right;
-  if (is_down(GLFW_KEY_E)) way.y += 1.0f;
-  if (is_down(GLFW_KEY_Q)) way.y -= 1.0f;
+  if (is_down(GLFW_KEY_E)) way += axes_[1];
+  if (is_down(GLFW_KEY_Q)) way -= axes_[1];
   const bool fast = is_down(GLFW_KEY_LEFT_SHIFT) || is_down(GLFW_KEY_RIGHT_SHIFT);
   const glm::vec3 step = way * (speed_ * seconds * (fast ? 4.0f : 1.0f));
   state.camera.eye += step;
@@ -95,7 +95,7 @@ bool Controls::drag(ViewState& state) {
     yaw_rad_ += kRadPerPixel * right;
     pitch_rad_ = std::clamp(pitch_rad_ - kRadPerPixel * below, 0.01f - kHalfPi, kHalfPi - 0.01f);
     const float distance = glm::length(state.camera.target - state.camera.eye);
-    state.camera.target = state.camera.eye + distance * direction(yaw_rad_, pitch_rad_);
+    state.camera.target = state.camera.eye + distance * direction();
   }
   return drag_ != Drag::kNone;
 }

@@ -25,6 +25,9 @@ class Controls {
   bool is_down(int key) const;
 
   GLFWwindow* window_;
+  glm::vec3 direction() const;
+
+  glm::mat3 axes_;  // of the world: right, up, towards the viewer
   float yaw_rad_ = 0.0f;
   float pitch_rad_ = 0.0f;
   float speed_;  // units a second

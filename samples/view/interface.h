@@ -69,7 +69,7 @@ LSP_BEGIN(ViewFrame)
   LSP_FLOAT exposure;   /* factor */
   LSP_FLOAT heat_white; /* steps */
   LSP_UINT blue_first;  /* the window's images are BGRA, not RGBA */
-  LSP_UINT reserved;
+  LSP_UINT z_up;        /* z, not y, points to the sky */
 LSP_END(ViewFrame)
 
 /* A surface that a path has come to. */

@@ -26,6 +26,7 @@ struct Arguments {
   std::string effect = "light";
   TraceArguments trace;
   std::string camera;
+  std::string up;
   std::string size = "960x540";
   std::string screenshot;
   uint32_t frames = 0;  // 0: until the window is closed
@@ -185,12 +186,18 @@ void run(Arguments& arguments, const CommonOptions& common) {
   if ((header.required_features & (LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS)) == 0)
     say(common, arguments.file, {"neither Line Spaces nor cells in the file: both halves are exact"});
   const float aspect = static_cast<float>(size.x) / static_cast<float>(size.y);
-  const View view = default_view(scene, *make_cpu_tracer(scene, 0), glm::vec3(0, 1, 0), aspect);
+  const glm::vec3 up = !arguments.up.empty() || camera ? named_up(arguments.up) : likely_up(scene);
+  if (arguments.up.empty() && up.z > 0)
+    say(common, arguments.file, {"lies flat in x and y: z is taken to be up; --up y where that is wrong"});
+  const View view = default_view(scene, *make_cpu_tracer(scene, 0), up, aspect);
   state.camera = view.camera;
   Sky sky;
+  sky.up = up;
+  sky.sun_direction = axes(up) * sky.sun_direction;
   if (suit(sky, view.lamp, scene))
     say(common, arguments.file, {"a hall without lights: a lamp hangs in its middle"});
   if (camera) state.camera = *camera;
+  state.camera.up = up;
 
   const Window window(size);
   Gpu gpu(window.handle(), arguments.validation);
@@ -239,6 +246,10 @@ int main(int argc, char** argv) {
   add_trace_arguments(app, a.trace);
   app.add_option("--camera", a.camera,
                  "X,Y,Z:X,Y,Z:FOV, the vertical angle in degrees (default: from the scene)");
+  app.add_option(
+         "--up", a.up,
+         "Which axis is up: y or z (default y; without --camera z for a scene that lies flat in x and y)")
+      ->check(CLI::IsMember({"y", "z"}));
   app.add_option("--size", a.size, "Of the window, in pixels (default 960x540)");
   app.add_option("--radius", a.state.ao_distance,
                  "Reach of --effect ao in diagonals of the scene (default 0.1)")
@@ -253,7 +264,7 @@ int main(int argc, char** argv) {
   arrange_help(
       app, "lsp-view room.lsp --quality fast",
       {{"What most people need", {"FILE", "--effect", "--split SHARE", "--quality", "--max-loss PERCENT"}},
-       {"The picture", {"--camera EYE:TARGET:ANGLE", "--size WxH", "--exposure STOPS", "--radius"}},
+       {"The picture", {"--camera EYE:TARGET:ANGLE", "--size WxH", "--up", "--exposure STOPS", "--radius"}},
        {"Line Spaces", {"--near", "--lod"}},
        {"Without hands", {"--frames", "--screenshot FILE.png", "--validation"}}});
   return run_program(kProgram, app, argc, argv, [&] { run(a, common); });

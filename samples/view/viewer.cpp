@@ -24,7 +24,9 @@ auto fields(const ViewState& s) { return std::tie(s.camera, s.effect, s.split, s
 
 void set_camera(ViewFrame& frame, const Camera& camera) {
   const glm::vec3 forward = glm::normalize(camera.target - camera.eye);
-  const glm::vec3 world_up = std::abs(forward.y) > 0.999f ? glm::vec3(0, 0, 1) : glm::vec3(0, 1, 0);
+  // Straight up or down there is no other way up than towards the viewer.
+  const bool level = std::abs(glm::dot(forward, camera.up)) <= 0.999f;
+  const glm::vec3 world_up = level ? camera.up : axes(camera.up)[2];
   const glm::vec3 right = glm::normalize(glm::cross(forward, world_up));
   frame.eye = from_glm(camera.eye);
   frame.forward = from_glm(forward);
@@ -38,6 +40,7 @@ void set_light(ViewFrame& frame, const Sky& sky) {
   frame.sun_radius = sky.sun_radius_rad;
   frame.sun_irradiance = from_glm(sky.sun_irradiance);
   frame.sky_brightness = sky.brightness;
+  frame.z_up = sky.up.z > 0 ? 1 : 0;
   frame.lamp_position = from_glm(sky.lamp_position);
   frame.lamp_radius = sky.lamp_radius;
   frame.lamp_intensity = from_glm(sky.lamp_intensity);

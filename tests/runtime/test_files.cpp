@@ -9,6 +9,7 @@
 
 #include "lsp/lsp.h"
 #include "lsp/scene_file.hpp"
+#include "resident.h"
 #include "scene_builder.h"
 
 namespace lsp::test {
@@ -51,6 +52,31 @@ TEST_F(Files, WhatCannotBeMapped) {
   EXPECT_EQ(lsp_map_file(write("empty", {}).c_str(), &mapping, &error), LSP_ERROR_INVALID);
   EXPECT_EQ(mapping.bytes, nullptr);
   lsp_unmap_file(&mapping);  // nothing to do, and no harm
+}
+
+// Pages that were read are given back; the scene stays open and answers as before.
+TEST_F(Files, ReleasedPagesComeInAgain) {
+  BuildOptions options;
+  options.triangles = 20000;
+  const std::string path = write("pages.lsp", write_raw(build_parts(options)));
+  lsp_mapping mapping;
+  lsp_scene scene;
+  ASSERT_EQ(lsp_map_file(path.c_str(), &mapping, nullptr), LSP_OK);
+  ASSERT_EQ(lsp_open(mapping.bytes, mapping.size, &scene, nullptr), LSP_OK);
+  const auto sum = [&] {
+    uint64_t sum = 0;
+    for (uint64_t i = 0; i < mapping.size; ++i) sum += static_cast<const unsigned char*>(mapping.bytes)[i];
+    return sum;
+  };
+  const uint64_t before = sum();
+  EXPECT_GE(resident_bytes(mapping.bytes), mapping.size);
+  lsp_release_pages(&mapping);
+  EXPECT_EQ(resident_bytes(mapping.bytes), 0u);
+  EXPECT_EQ(scene.header->triangle_count, options.triangles);
+  EXPECT_LT(resident_bytes(mapping.bytes), mapping.size);  // with neighbours of the page that was read
+  EXPECT_EQ(sum(), before);
+  lsp_unmap_file(&mapping);
+  lsp_release_pages(&mapping);  // nothing to do, and no harm
 }
 
 // Sections beyond 4 GiB, in a file that is mostly a hole.

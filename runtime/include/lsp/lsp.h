@@ -57,6 +57,11 @@ typedef struct lsp_mapping {
 LSP_API lsp_status lsp_map_file(const char* path, lsp_mapping* mapping, lsp_error* error);
 LSP_API void lsp_unmap_file(lsp_mapping* mapping); /* clears it, too; an empty one is left alone */
 
+/* Gives the memory back that pages of the mapping take in this process, and keeps the mapping: scenes stay
+ * open, and what is read of them afterwards comes in again. For a file that was uploaded to a device, of
+ * which the header alone is asked for from then on, or whose rays rest. */
+LSP_API void lsp_release_pages(const lsp_mapping* mapping);
+
 /* Sections a file may have at most; lsp_open compares each with all others. */
 #define LSP_MAX_SECTIONS 256u
 

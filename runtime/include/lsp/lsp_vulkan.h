@@ -32,9 +32,15 @@ extern "C" {
  */
 
 /* What the scene is wanted for; a section that nothing asks for gets no buffer and is never read. */
-#define LSP_USE_EXACT 0x1u       /* exact traces: NODE (NTree: GRID, CELL, REFS), TRIA, NRML */
-#define LSP_USE_APPROXIMATE 0x2u /* approximate traces: these and LSPC, BITS, CAND */
+#define LSP_USE_EXACT 0x1u       /* exact traces: NODE (of cells WNOD; NTree: GRID, CELL, REFS), TRIA, NRML */
+#define LSP_USE_APPROXIMATE 0x2u /* approximate traces: these and the tables */
 #define LSP_USE_MATERIALS 0x4u   /* MATL, for the engine's own shaders */
+/* Approximate traces of cells from tables alone, at the dial LSP_DIAL_TABLES: without CNOD and CREF, by which
+ * cells are traced exactly. Of files without cells it is LSP_USE_APPROXIMATE. */
+#define LSP_USE_TABLES 0x8u
+/* Besides the others: all that these traces are asked is whether there is something (LSP_TRACE_OCCLUSION).
+ * Without NRML; from tables alone without TRIA, too, unless triangles are there in part. */
+#define LSP_USE_OCCLUSION 0x10u
 
 /* And whether sections may be read through buffer device addresses instead of descriptors, where the device's
  * bufferDeviceAddress feature is on. */
@@ -65,7 +71,7 @@ typedef struct lsp_vulkan_buffer {
   uint64_t bytes;       /* size of the buffer */
 } lsp_vulkan_buffer;
 
-/* The buffers to make, in the order of the file; buffers[0] is the header's. */
+/* The buffers to make; buffers[0] is the header's. */
 typedef struct lsp_vulkan_plan {
   uint32_t buffer_count;                             /* of buffers in use */
   lsp_vulkan_buffer buffers[LSP_VULKAN_MAX_BUFFERS]; /* what to make */
@@ -75,6 +81,7 @@ typedef struct lsp_vulkan_plan {
   uint32_t base_structure; /* LSP_BASE_*: the shader has to be made for it */
   uint32_t
       exact_structure; /* the same of exact rays alone: of cells LSP_BASE_WIDE, before 2.3 LSP_BASE_BVH */
+  uint32_t uses;       /* LSP_USE_*: what can be traced with these buffers */
 } lsp_vulkan_plan;
 
 /* Usage of every buffer of a plan without addresses. */
@@ -86,6 +93,29 @@ typedef struct lsp_vulkan_plan {
 LSP_API lsp_status lsp_vulkan_plan_buffers(const lsp_scene* scene, uint32_t uses,
                                            const lsp_vulkan_limits* limits, lsp_vulkan_plan* plan,
                                            lsp_error* error);
+
+/* From one plan to the next, in buffers and bytes. */
+typedef struct lsp_vulkan_change {
+  uint32_t kept; /* buffers [0, kept) of the new plan are there already, the others are to be made */
+  uint32_t from[LSP_VULKAN_MAX_BUFFERS]; /* which of the old plan's buffers each of those is */
+  uint64_t bytes_kept;                   /* of those; there the cursor of lsp_vulkan_next_copy begins */
+  uint64_t bytes_added;                  /* of the others */
+  uint64_t bytes_dropped;                /* of buffers of the old plan that the new one does without */
+} lsp_vulkan_change;
+
+/* Plans as lsp_vulkan_plan_buffers what of the scene is to be on the device for `uses`, more or less than
+ * now: of the plan `old`, of the same scene, what both need is kept. To load tables first and what exact rays
+ * need later, or to give back what is no longer asked for. The new buffers come last, so that
+ *
+ *   uint64_t cursor = change.bytes_kept;
+ *   while (lsp_vulkan_next_copy(scene, plan, max_bytes, &cursor, &copy)) ...
+ *
+ * uploads these alone; traces of the old plan may go on meanwhile, on its descriptor set. Where the new plan
+ * reads through addresses and the old one did not, nothing is kept; of an old plan of zeros there is nothing.
+ * `plan` and `old` are two. */
+LSP_API lsp_status lsp_vulkan_change_plan(const lsp_scene* scene, const lsp_vulkan_plan* old, uint32_t uses,
+                                          const lsp_vulkan_limits* limits, lsp_vulkan_plan* plan,
+                                          lsp_vulkan_change* change, lsp_error* error);
 
 /* ---- import: no copy ------------------------------------------------------------------------------------
  */
@@ -153,6 +183,24 @@ LSP_API void lsp_vulkan_record_upload_barrier(const lsp_vulkan_functions* functi
  * compiled away; with a part missing that a scene needs its answers are wrong. Cells: a pipeline for the dial
  * LSP_DIAL_TABLES alone does without LSP_PART_CELL_EXACT. */
 LSP_API uint32_t lsp_vulkan_parts(const lsp_scene* scene);
+
+/* A kind of trace: what a pipeline for it is made of, and its dial. `stack`, `flags` and `parts` are the
+ * values of the specialization constants LSP_VULKAN_*_CONSTANT. */
+typedef struct lsp_vulkan_kind {
+  uint32_t base_structure; /* LSP_BASE_*: of the shader, as in a plan */
+  uint32_t stack;          /* entries; several scenes may share the largest */
+  uint32_t flags;          /* LSP_TRACE_*, those that make a difference */
+  uint32_t parts;          /* LSP_PART_*; several scenes may share all that any of them needs */
+  uint32_t dial;           /* lsp_vulkan_trace_constants.dial */
+} lsp_vulkan_kind;
+
+/* What kind of trace `options` ask for of the scene with the plan's buffers. What these do not hold is not
+ * compiled in: cells of which tables alone are loaded have the dial LSP_DIAL_TABLES, whatever the quality;
+ * LSP_ERROR_UNSUPPORTED, and which LSP_USE_* is missing, where a trace cannot do without, and as lsp_trace
+ * for what the file or the library does not have. */
+LSP_API lsp_status lsp_vulkan_plan_trace(const lsp_scene* scene, const lsp_vulkan_plan* plan,
+                                         const lsp_trace_options* options, lsp_vulkan_kind* kind,
+                                         lsp_error* error);
 
 /* SPIR-V (for Vulkan 1.1) of the trace shader for scenes planned like `plan` (of cells: for approximate rays;
  * for exact ones set base_structure of a copy to its exact_structure), entry point "main"; with `counting`

@@ -72,11 +72,12 @@ vec3 above(ViewVertex v, vec3 direction) {
 }
 
 vec3 sky_radiance(vec3 direction) {
-  float haze = pow(1.0 - max(direction.y, 0.0), 3.0);
+  float height = frame.z_up != 0u ? direction.z : direction.y;
+  float haze = pow(1.0 - max(height, 0.0), 3.0);
   vec3 clear = mix(vec3(0.28, 0.52, 1.0), vec3(0.86, 0.92, 1.0), haze) * 2.2;
   float toward = max(dot(direction, frame.sun_direction), 0.0);
   vec3 glow = vec3(1.0, 0.85, 0.6) * (0.9 * pow(toward, 24.0));
-  return frame.sky_brightness * mix(vec3(0.24, 0.22, 0.20), clear + glow, clamp(direction.y * 12.0 + 0.5, 0.0, 1.0));
+  return frame.sky_brightness * mix(vec3(0.24, 0.22, 0.20), clear + glow, clamp(height * 12.0 + 0.5, 0.0, 1.0));
 }
 
 struct Surface {
