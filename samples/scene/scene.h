@@ -72,7 +72,8 @@ struct Detail {
   bool shows(float from) const { return scale >= from; }
 };
 
-// The scenes, by name: "atrium", "grove", "spheres", "plane", "objects", "stadium". An unknown name throws lsp::Failure.
+// The scenes, by name: "atrium", "grove", "spheres", "plane", "objects", "stadium". An unknown name throws
+// lsp::Failure.
 Scene make_scene(const std::string& name, const Detail& detail);
 Scene make_atrium(const Detail& detail);
 Scene make_grove(const Detail& detail);
