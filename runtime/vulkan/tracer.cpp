@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "device.h"
+#include "lsp/instances.hpp"
 #include "scene_buffers.h"
 
 namespace lsp {
@@ -286,6 +287,7 @@ class VulkanTracer::Impl {
   void load_next(const lsp_scene& scene, LoadPath path);
   bool try_import(const lsp_scene& scene, bool forced);
   void attach(const lsp_scene& scene, SceneBuffers&& buffers, bool imported);
+  void try_instances();
   void check_asset(const Loaded& asset) const;
   void put_instances(const lsp_instances& instances, const lsp_trace_options& options);
   // Records the dispatch that traces so many rays; its pipeline and set are ready.
@@ -301,7 +303,8 @@ class VulkanTracer::Impl {
 
   VulkanOptions options_;
   uint32_t uses_ = 0;
-  std::string name_;  // of the scene that is being loaded, before what is wrong with it
+  bool instanced_ = false;  // the scenes are assets of instances
+  std::string name_;        // of the scene that is being loaded, before what is wrong with it
   std::unique_ptr<Shader> shader_;
   std::unique_ptr<Pipelines> pipelines_;
   Buffer counters_;
@@ -348,9 +351,11 @@ void VulkanTracer::Impl::check_asset(const Loaded& asset) const {
   }
 }
 
-// Adds the scene and traces one ray, so that a device that cannot read it fails here.
+// Adds the scene and traces one ray, so that a device that cannot read it fails here. Of assets that is left
+// to try_instances: theirs is another shader, and to compile this one as well takes seconds on lavapipe.
 void VulkanTracer::Impl::attach(const lsp_scene& scene, SceneBuffers&& buffers, bool imported) {
   loaded.push_back({scene, std::move(buffers), imported});
+  if (instanced_) return;
   try {
     const LspRay ray{scene.header->bounds_min, 0.0f, {1.0f, 1.0f, 1.0f}, 3.402823e38f};
     LspHit hit;
@@ -360,6 +365,22 @@ void VulkanTracer::Impl::attach(const lsp_scene& scene, SceneBuffers&& buffers, 
     loaded.pop_back();
     throw;
   }
+}
+
+// Traces a ray through an instance of every asset.
+void VulkanTracer::Impl::try_instances() {
+  std::vector<const lsp_scene*> assets;
+  std::vector<lsp_instance> places;
+  for (const Loaded& asset : loaded) {
+    places.push_back({static_cast<uint32_t>(assets.size()), {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}, 0xFF, 0});
+    assets.push_back(&asset.scene);
+  }
+  const Instances instances(std::move(assets), places);
+  const float* corner = instances.view().nodes[0].lo;
+  const LspRay ray{{corner[0], corner[1], corner[2]}, 0.0f, {1.0f, 1.0f, 1.0f}, 3.402823e38f};
+  LspHit hit;
+  const uint32_t flags = (uses_ & LSP_USE_EXACT) != 0 ? 0 : LSP_TRACE_APPROXIMATE;
+  trace_instances(instances.view(), {flags, 0.0f, 0, 0.0f}, 0xFF, {&ray, 1}, {&hit, 1}, false);
 }
 
 bool VulkanTracer::Impl::try_import(const lsp_scene& scene, bool forced) {
@@ -407,6 +428,7 @@ void VulkanTracer::Impl::load_all(std::span<const lsp_scene* const> scenes, Load
       throw Failure(failure.exit(), failure.file(), name_ + failure.what());
     }
   }
+  if (numbered && !loaded.empty()) try_instances();
 }
 
 void VulkanTracer::Impl::load(std::span<const lsp_scene* const> scenes, uint32_t uses, LoadPath path,
@@ -416,6 +438,7 @@ void VulkanTracer::Impl::load(std::span<const lsp_scene* const> scenes, uint32_t
     throw Failure(Exit::kUnsupported, "",
                   "instances need buffer addresses (bufferDeviceAddress), which the device lacks; trace them "
                   "on the CPU");
+  instanced_ = numbered;
   uses_ = uses | (numbered ? LSP_USE_ADDRESSES_ALWAYS : device->address_uses);
   load_note.clear();
   try {

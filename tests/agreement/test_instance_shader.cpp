@@ -189,7 +189,7 @@ TEST_F(InstanceShader, AssetsAreLoadedOnce) {
   const lsp_scene &ball = assets().ball->scene(), &soup = assets().soup->scene();
   VulkanTracer tracer;
   const auto uploaded = [&](const std::vector<const lsp_scene*>& scenes) {
-    tracer.load(scenes, LSP_USE_APPROXIMATE, LoadPath::kUpload);
+    tracer.load(scenes, LSP_USE_EXACT, LoadPath::kUpload);
     EXPECT_EQ(tracer.load_path(), LoadPath::kUpload);
     EXPECT_EQ(tracer.load_note(), "");
     return tracer.bytes_uploaded();
@@ -241,8 +241,7 @@ TEST_F(InstanceShader, ValidationHasNothingToSay) {
   std::vector<LspHit> hits(rays_.size());
   for (const LoadPath path : {LoadPath::kAutomatic, LoadPath::kUpload}) {
     tracer->load(scenes, LSP_USE_EXACT, path);
-    for (const bool count : {false, true})
-      tracer->trace_instances(instances.view(), {0, 0}, 0xFF, rays_, hits, count);
+    tracer->trace_instances(instances.view(), {0, 0}, 0xFF, rays_, hits);
   }
   for (const std::string& message : tracer->validation_messages()) ADD_FAILURE() << message;
 }
