@@ -1,7 +1,8 @@
 // Makes instances ready for rays: inverse transforms, boxes, and a tree over these (binned surface area
 // heuristic: Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", 2007).
-#include "instances.h"
+#include "lsp/lsp_instances.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -11,8 +12,14 @@
 namespace lsp {
 namespace {
 
-static_assert(sizeof(lsp_instance) == 60 && sizeof(lsp_instance_record) == 192 &&
-              sizeof(lsp_instance_node) == 32);
+// As shaders have it, too: lsp/lsp_instances.glsl.
+static_assert(sizeof(lsp_instance) == 60 && sizeof(lsp_instance_record) == 160 &&
+              sizeof(lsp_instance_node) == 32 && offsetof(lsp_instance, mask) == 52 &&
+              offsetof(lsp_instance_record, inverse) == 64 &&
+              offsetof(lsp_instance_record, translation) == 100 &&
+              offsetof(lsp_instance_record, translation_rest) == 112);
+
+constexpr double kRounding = 0x1p-24;  // of a float: u in NUMERICS.md
 
 // The caller's memory: records, nodes, and the numbers of the instances in the order of the tree.
 constexpr uint64_t kBytesEach =
@@ -21,7 +28,13 @@ constexpr uint64_t kBytesEach =
 // ---- an instance
 // -------------------------------------------------------------------------------------------------
 
-// The inverse of a matrix of three rows. False: there is none in double precision of floats' products.
+// rows[3][3] * v.
+void multiply(const double rows[9], const double v[3], double out[3]) {
+  for (int i = 0; i < 3; ++i) out[i] = rows[3 * i] * v[0] + rows[3 * i + 1] * v[1] + rows[3 * i + 2] * v[2];
+}
+
+// The inverse of a matrix of three rows. False: there is none in double precision of floats' products, or
+// it is beyond single precision.
 bool invert(const double m[9], double out[9]) {
   double columns = 1;
   for (int i = 0; i < 3; ++i) columns *= std::sqrt(m[i] * m[i] + m[3 + i] * m[3 + i] + m[6 + i] * m[6 + i]);
@@ -34,7 +47,7 @@ bool invert(const double m[9], double out[9]) {
   for (int i = 0; i < 3; ++i) {
     for (int k = 0; k < 3; ++k) {
       out[3 * i + k] = cofactors[3 * k + i] / determinant;
-      if (!std::isfinite(out[3 * i + k])) return false;
+      if (!std::isfinite(static_cast<float>(out[3 * i + k]))) return false;
     }
   }
   return true;
@@ -50,7 +63,7 @@ double norm(const double m[9]) {
 
 // The box in scene space that holds the asset's box, moved; grown by what a hit may lie outside of it for
 // rays from within it. False: it is not finite.
-bool find_box(const LspHeader& header, const double linear[9], double condition,
+bool find_box(const LspHeader& header, const double linear[9], const double translation[3], double condition,
               lsp_instance_record& record) {
   const lsp_float3 lo = header.bounds_min, hi = header.bounds_max;
   double from[3], to[3], reach = 0;
@@ -62,12 +75,12 @@ bool find_box(const LspHeader& header, const double linear[9], double condition,
     multiply(linear, at, moved);
     for (int i = 0; i < 3; ++i) {
       reach = std::max(reach, std::abs(moved[i]));
-      moved[i] += record.translation[i];
+      moved[i] += translation[i];
       from[i] = std::min(from[i], moved[i]);
       to[i] = std::max(to[i], moved[i]);
     }
   }
-  const double growth = 4 * kRounding * condition * reach;
+  const double growth = 8 * kRounding * condition * reach;
   for (int i = 0; i < 3; ++i) {
     const double margin =
         growth + 2 * kRounding * std::max(std::abs(from[i]), std::abs(to[i]));  // to floats, too
@@ -88,13 +101,18 @@ const char* prepare(const lsp_instance& instance, const LspHeader& header, const
   double linear[9];
   for (int i = 0; i < 3; ++i)
     for (int k = 0; k < 3; ++k) linear[3 * i + k] = instance.transform[4 * i + k];
-  if (!invert(linear, record.inverse))
-    return "transform has no inverse; give one that keeps three dimensions";
-  multiply(linear, origin, record.translation);
-  for (int i = 0; i < 3; ++i) record.translation[i] += instance.transform[4 * i + 3];
-  const double condition = norm(linear) * norm(record.inverse);
-  record.growth = static_cast<float>(kRounding * (16 + 12 * condition));
-  if (!find_box(header, linear, condition, record))
+  double inverse[9], translation[3];
+  if (!invert(linear, inverse)) return "transform has no inverse; give one that keeps three dimensions";
+  std::copy(inverse, inverse + 9, record.inverse);
+  multiply(linear, origin, translation);
+  for (int i = 0; i < 3; ++i) {
+    translation[i] += instance.transform[4 * i + 3];
+    record.translation[i] = static_cast<float>(translation[i]);
+    record.translation_rest[i] = static_cast<float>(translation[i] - record.translation[i]);
+  }
+  const double condition = norm(linear) * norm(inverse);
+  record.growth = static_cast<float>(kRounding * (16 + 24 * condition));
+  if (!find_box(header, linear, translation, condition, record))
     return "transform puts it beyond single precision; bring it nearer";
   return nullptr;
 }
@@ -148,7 +166,7 @@ class Builder {
       std::copy(record.lo, record.lo + 3, node.lo);
       std::copy(record.hi, record.hi + 3, node.hi);
       node.growth = record.growth;
-      node.child = order_[first] | kInstanceBit;
+      node.child = order_[first] | LSP_INSTANCE_BIT;
       return;
     }
     const uint32_t left = split(first, count, depth);
@@ -180,7 +198,7 @@ class Builder {
       if (hi[i] - lo[i] > hi[axis] - lo[axis]) axis = i;
     // Halves wherever the heuristic might make the tree deeper than a ray's stack is.
     const uint32_t levels = static_cast<uint32_t>(std::bit_width(count - 1));
-    if (count > 2 && hi[axis] > lo[axis] && depth + 1 + levels < kInstanceDepth) {
+    if (count > 2 && hi[axis] > lo[axis] && depth + 1 + levels < LSP_INSTANCE_DEPTH) {
       const uint32_t left = split_by_area(first, count, axis, lo[axis], hi[axis]);
       if (left > 0 && left < count) return left;
     }

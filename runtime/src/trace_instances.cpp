@@ -1,16 +1,190 @@
-// Traces rays through instances on the CPU: small batches on the stack, assets by lsp_trace.
+// Traces rays through instances on the CPU. A batch of rays walks the tree over instances, each ray as far as
+// its next instance; those that reach instances of one asset are moved to its space and traced together by
+// lsp_trace; and so on until no ray has an instance left that could be nearer than what it has hit.
+#include <algorithm>
+#include <cmath>
+
 #include "error.h"
-#include "instance_batch.h"
+#include "lsp/lsp_instances.h"
 #include "trace_options.h"
+#include "trace_subset.h"
 
 namespace lsp {
 namespace {
 
+using namespace subset;
+using LspInstances = const lsp_instances&;
+
+struct LspInstanceNode {
+  vec3 lo;
+  uint child;
+  vec3 hi;
+  float growth;
+};
+struct LspPlace {
+  vec3 row_0, row_1, row_2;
+  vec3 translation;
+  vec3 translation_rest;
+};
+
+vec3 vector_of(const float v[3]) { return {v[0], v[1], v[2]}; }
+LspInstanceNode lsp_load_instance_node(LspInstances instances, uint i) {
+  const lsp_instance_node& node = instances.nodes[i];
+  return {vector_of(node.lo), node.child, vector_of(node.hi), node.growth};
+}
+uint lsp_load_instance_mask(LspInstances instances, uint i) { return instances.records[i].instance.mask; }
+LspPlace lsp_load_place(LspInstances instances, uint i) {
+  const lsp_instance_record& record = instances.records[i];
+  return {vector_of(record.inverse), vector_of(record.inverse + 3), vector_of(record.inverse + 6),
+          vector_of(record.translation), vector_of(record.translation_rest)};
+}
+
+// A ray on its way through the tree over instances.
+struct InstanceWalk {
+#include "lsp/arithmetic.h"
+#include "lsp/instance_walk.h"
+
+  LspInstanceRay ray;
+};
+
 // Rays that walk together. Of 1, 16, 64, 128 and 256 this was the best in all: 1 is a tenth faster for
 // shuffled rays and up to 1.4 times slower for others, more only takes more of the stack.
 constexpr uint32_t kBatch = 64;
-using Arrays = InstanceArrays<kBatch>;
-static_assert(sizeof(Arrays) <= 20 * 1024);
+
+// A batch of rays and the hits they have so far, whose normals are in object space until the end.
+class InstanceBatch {
+ public:
+  InstanceBatch(const lsp_instances& instances, const lsp_trace_options& options, uint32_t mask,
+                bool counting, lsp_error* error)
+      : instances_(instances), options_(options), mask_(mask), counting_(counting), error_(error) {
+    // Hits are told apart by their primitives here.
+    if ((options_.flags & LSP_TRACE_OCCLUSION) == 0) return;
+    options_.flags = (options_.flags & ~LSP_TRACE_OCCLUSION) | LSP_TRACE_ANY_HIT;
+  }
+
+  // Traces rays[0, count), at most kBatch.
+  lsp_status trace(const LspRay* rays, LspHit* hits, uint32_t count) {
+    rays_ = rays;
+    hits_ = hits;
+    begin(count);
+    while (advance()) {
+      std::sort(waiting_, waiting_ + waiting_count_);
+      for (uint32_t first = 0, end = 0; first < waiting_count_; first = end) {
+        const uint32_t asset = asset_at(first);
+        while (end < waiting_count_ && asset_at(end) == asset) ++end;
+        if (const lsp_status status = trace_waiting(asset, &waiting_[first], end - first); status != LSP_OK)
+          return status;
+      }
+    }
+    for (uint32_t i = 0; i < count; ++i) {
+      if (hits[i].primitive == LSP_NONE) continue;
+      const LspPlace place = lsp_load_place(instances_, LSP_HIT_INSTANCE(hits[i]));
+      hits[i].normal = lsp_float3_of(InstanceWalk::lsp_move_normal(place, lsp_vec3(hits[i].normal)));
+      ++counts_.hits;
+    }
+    return LSP_OK;
+  }
+
+  // Of all batches so far.
+  const lsp_trace_counts& counts() const { return counts_; }
+
+ private:
+  // A ray that waits, as a number to sort by: its asset's (the lowest 20 bits of it: others may come between
+  // those of one, which are then traced in several parts), its instance's, its own.
+  static constexpr uint32_t kRayBits = 20, kInstanceBits = 24;
+  static_assert(kBatch <= 1u << kRayBits && 1u << kInstanceBits > LSP_MAX_INSTANCES);
+  static uint32_t ray_of(uint64_t waiting) { return static_cast<uint32_t>(waiting) & ((1u << kRayBits) - 1); }
+  static uint32_t instance_of(uint64_t waiting) {
+    return static_cast<uint32_t>(waiting >> kRayBits) & LSP_MAX_INSTANCES;
+  }
+  uint32_t asset_of(uint32_t instance) const { return instances_.records[instance].instance.asset; }
+  uint32_t asset_at(uint32_t k) const { return asset_of(instance_of(waiting_[k])); }
+
+  void begin(uint32_t count) {
+    on_count_ = 0;
+    counts_.rays += count;
+    for (uint32_t i = 0; i < count; ++i) {
+      hits_[i] = {INFINITY, LSP_NONE, 0, 0, {0, 0, 0}, 0};
+      if (!InstanceWalk::lsp_is_valid(rays_[i])) {
+        ++counts_.invalid;
+        continue;
+      }
+      if (instances_.count == 0) continue;
+      walks_[i].ray = walks_[i].lsp_begin_instances(instances_, rays_[i]);
+      on_[on_count_++] = i;
+    }
+  }
+
+  // Takes every ray that goes on to its next instance. False: none goes on.
+  bool advance() {
+    waiting_count_ = 0;
+    uint32_t going = 0;
+    for (uint32_t k = 0; k < on_count_; ++k) {
+      const uint32_t i = on_[k];
+      const bool hit = hits_[i].primitive != LSP_NONE;
+      if (hit && (options_.flags & LSP_TRACE_ANY_HIT) != 0) continue;
+      InstanceWalk& walk = walks_[i];
+      const uint32_t before = walk.lsp_instance_visited;
+      const uint32_t instance =
+          walk.lsp_next_instance(instances_, walk.ray, mask_, hit ? hits_[i].t : rays_[i].tmax);
+      counts_.nodes += walk.lsp_instance_visited - before;
+      if (instance == LSP_NONE) continue;
+      on_[going++] = i;
+      waiting_[waiting_count_++] =
+          uint64_t{asset_of(instance)} << (kInstanceBits + kRayBits) | uint64_t{instance} << kRayBits | i;
+    }
+    on_count_ = going;
+    return going > 0;
+  }
+
+  // Traces the rays that wait for instances of one asset.
+  lsp_status trace_waiting(uint32_t asset, const uint64_t* waiting, uint32_t count) {
+    for (uint32_t k = 0; k < count; ++k) {
+      const uint32_t i = ray_of(waiting[k]), number = instance_of(waiting[k]);
+      LspRay& moved = moved_[k];
+      moved = InstanceWalk::lsp_move_ray(lsp_load_place(instances_, number), rays_[i]);
+      if (hits_[i].primitive == LSP_NONE) continue;
+      // Of hits at one t the lowest instance is the answer.
+      const bool before = number < LSP_HIT_INSTANCE(hits_[i]);
+      moved.tmax = before ? InstanceWalk::lsp_step_up(hits_[i].t) : hits_[i].t;
+    }
+    lsp_trace_counts counts{};
+    if (const lsp_status status = lsp_trace(instances_.assets[asset], &options_, moved_, found_, count,
+                                            counting_ ? &counts : nullptr, error_);
+        status != LSP_OK)
+      return status;
+    counts.rays = counts.invalid = counts.hits = 0;  // those of the scene are counted here
+    lsp_add_counts(&counts_, &counts);
+    for (uint32_t k = 0; k < count; ++k) keep(hits_[ray_of(waiting[k])], found_[k], instance_of(waiting[k]));
+    return LSP_OK;
+  }
+
+  static void keep(LspHit& hit, const LspHit& found, uint32_t number) {
+    const uint32_t incomplete = (hit.flags | found.flags) & LSP_HIT_INCOMPLETE;
+    if (found.primitive != LSP_NONE) {
+      hit = found;
+      hit.flags |= number << LSP_HIT_INSTANCE_SHIFT;
+    }
+    hit.flags |= incomplete;
+  }
+
+  const lsp_instances& instances_;
+  lsp_trace_options options_;
+  const uint32_t mask_;
+  const bool counting_;
+  lsp_error* const error_;
+  lsp_trace_counts counts_{};
+  const LspRay* rays_ = nullptr;
+  LspHit* hits_ = nullptr;
+  uint32_t on_count_ = 0;
+  uint32_t waiting_count_ = 0;
+  InstanceWalk walks_[kBatch];
+  uint32_t on_[kBatch];  // rays that go on
+  uint64_t waiting_[kBatch];
+  LspRay moved_[kBatch];
+  LspHit found_[kBatch];
+};
+static_assert(sizeof(InstanceBatch) <= 26 * 1024);
 
 }  // namespace
 }  // namespace lsp
@@ -24,16 +198,11 @@ extern "C" lsp_status lsp_trace_instances(const lsp_instances* instances, const 
     if (const lsp_status status = lsp::check_scene(*instances->assets[i], *options, &fault); status != LSP_OK)
       return lsp::fail(error, status, 0, "asset %u: %s", i, fault.message);
   }
-  const auto trace_asset = [instances, error](uint32_t asset, const lsp_trace_options& how,
-                                              const LspRay* moved, LspHit* found, uint32_t size,
-                                              lsp_trace_counts* counted) {
-    return lsp_trace(instances->assets[asset], &how, moved, found, size, counted, error) == LSP_OK;
-  };
-  lsp::Arrays arrays;
-  lsp::InstanceBatch batch(*instances, *options, mask, counts != nullptr, arrays, trace_asset);
+  lsp::InstanceBatch batch(*instances, *options, mask, counts != nullptr, error);
   for (uint64_t first = 0; first < count; first += lsp::kBatch) {
     const auto size = static_cast<uint32_t>(std::min<uint64_t>(lsp::kBatch, count - first));
-    if (!batch.trace(rays + first, hits + first, size)) return LSP_ERROR_UNSUPPORTED;
+    if (const lsp_status status = batch.trace(rays + first, hits + first, size); status != LSP_OK)
+      return status;
   }
   if (counts != nullptr) lsp_add_counts(counts, &batch.counts());
   return LSP_OK;

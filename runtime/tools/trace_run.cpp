@@ -148,8 +148,7 @@ TraceReport trace_on_vulkan(const TraceTarget& target, const TraceRequest& reque
   const VulkanTrace counted = trace(rays, hits, true);
   report.counts = counted.counts;
   report.retraced = counted.retraced;
-  for (size_t i = 0; i < tracer.scene_count() && !rays.empty(); ++i)  // compiles the shaders to be timed
-    tracer.trace(request.options, rays.first(1), hits.first(1), false, i);
+  if (!rays.empty()) trace(rays.first(1), hits.first(1));  // compiles the shader to be timed
   for (uint32_t i = 0; i < request.repeats; ++i) {
     line.show((i + 1.0) / (request.repeats + 1.0));
     const VulkanTrace timed = trace(rays, hits);

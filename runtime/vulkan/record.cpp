@@ -1,4 +1,7 @@
 // Recording into the engine's command buffers, and the trace shader's words.
+#include <algorithm>
+#include <cstddef>
+
 #include "../src/error.h"
 #include "lsp/lsp_vulkan.h"
 
@@ -55,6 +58,13 @@ constexpr uint32_t kWideAddressesCount[] =
 #include "trace_wide_addresses_count.spv.inc"
     ;
 
+constexpr uint32_t kInstances[] =
+#include "trace_instances.spv.inc"
+    ;
+constexpr uint32_t kInstancesCount[] =
+#include "trace_instances_count.spv.inc"
+    ;
+
 struct Spirv {
   const uint32_t* words;
   size_t bytes;
@@ -74,6 +84,39 @@ template <class Function>
 bool load(VkDevice device, PFN_vkGetDeviceProcAddr get, const char* name, Function* function) {
   *function = reinterpret_cast<Function>(get(device, name));
   return *function != nullptr;
+}
+
+void write_binding(const lsp_vulkan_functions& functions, VkDevice device, VkDescriptorSet set,
+                   uint32_t binding, VkBuffer buffer) {
+  const VkDescriptorBufferInfo info{buffer, 0, VK_WHOLE_SIZE};
+  VkWriteDescriptorSet write{};
+  write.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
+  write.dstSet = set;
+  write.dstBinding = binding;
+  write.descriptorCount = 1;
+  write.descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
+  write.pBufferInfo = &info;
+  functions.update_descriptor_sets(device, 1, &write, 0, nullptr);
+}
+
+// All of a trace shader's; counters may be VK_NULL_HANDLE.
+void write_bindings(const lsp_vulkan_functions& functions, VkDevice device, VkDescriptorSet set,
+                    VkBuffer (&bound)[LSP_BINDING_COUNT], VkBuffer rays, VkBuffer hits, VkBuffer counters) {
+  bound[LSP_BINDING_RAYS] = rays;
+  bound[LSP_BINDING_HITS] = hits;
+  if (counters != VK_NULL_HANDLE) bound[LSP_BINDING_COUNTERS] = counters;
+  for (uint32_t i = 0; i < LSP_BINDING_COUNT; ++i) write_binding(functions, device, set, i, bound[i]);
+}
+
+// One invocation a ray.
+void record_dispatch(const lsp_vulkan_functions& functions, VkCommandBuffer commands, VkPipeline pipeline,
+                     VkPipelineLayout layout, VkDescriptorSet set, const void* constants, uint32_t bytes,
+                     uint32_t count) {
+  functions.cmd_bind_pipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline);
+  functions.cmd_bind_descriptor_sets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, layout, 0, 1, &set, 0,
+                                     nullptr);
+  functions.cmd_push_constants(commands, layout, VK_SHADER_STAGE_COMPUTE_BIT, 0, bytes, constants);
+  functions.cmd_dispatch(commands, (count + LSP_VULKAN_GROUP_SIZE - 1) / LSP_VULKAN_GROUP_SIZE, 1, 1);
 }
 
 }  // namespace
@@ -116,6 +159,11 @@ extern "C" const uint32_t* lsp_vulkan_trace_spirv(const lsp_vulkan_plan* plan, i
   return shader.words;
 }
 
+extern "C" const uint32_t* lsp_vulkan_instances_spirv(int counting, size_t* bytes) {
+  *bytes = counting != 0 ? sizeof kInstancesCount : sizeof kInstances;
+  return counting != 0 ? kInstancesCount : kInstances;
+}
+
 extern "C" void lsp_vulkan_address_table(const lsp_vulkan_plan* plan, const VkDeviceAddress* buffer_addresses,
                                          VkDeviceAddress table[LSP_VULKAN_ADDRESS_COUNT]) {
   for (uint32_t i = 0; i < LSP_VULKAN_ADDRESS_COUNT; ++i) table[i] = 0;
@@ -129,15 +177,31 @@ extern "C" void lsp_vulkan_address_table(const lsp_vulkan_plan* plan, const VkDe
 
 extern "C" void lsp_vulkan_write_address_table(const lsp_vulkan_functions* functions, VkDevice device,
                                                VkDescriptorSet set, VkBuffer table) {
-  const VkDescriptorBufferInfo info{table, 0, VK_WHOLE_SIZE};
-  VkWriteDescriptorSet write{};
-  write.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
-  write.dstSet = set;
-  write.dstBinding = LSP_BINDING_NODES;
-  write.descriptorCount = 1;
-  write.descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
-  write.pBufferInfo = &info;
-  functions->update_descriptor_sets(device, 1, &write, 0, nullptr);
+  write_binding(*functions, device, set, LSP_BINDING_NODES, table);
+}
+
+// As lsp_instances.glsl has it.
+static_assert(sizeof(lsp_vulkan_asset) == 480 && offsetof(lsp_vulkan_asset, header) == 96);
+
+extern "C" lsp_status lsp_vulkan_describe_asset(const lsp_scene* scene, const lsp_vulkan_plan* plan,
+                                                const VkDeviceAddress* buffer_addresses,
+                                                const lsp_trace_options* options, lsp_vulkan_asset* asset,
+                                                lsp_error* error) {
+  *asset = {};
+  if (plan->addresses == 0)
+    return lsp::fail(error, LSP_ERROR_UNSUPPORTED, 0,
+                     "is planned without addresses; plan it with LSP_USE_ADDRESSES_ALWAYS");
+  const bool approximate = (options->flags & LSP_TRACE_APPROXIMATE) != 0;
+  const uint32_t structure = approximate ? plan->base_structure : plan->exact_structure;
+  if (structure != LSP_BASE_CELLS && structure != LSP_BASE_WIDE)
+    return lsp::fail(error, LSP_ERROR_UNSUPPORTED, 0,
+                     "no shader of instances walks its %s; bake it with --base cells or wide, or trace it on "
+                     "the CPU",
+                     structure == LSP_BASE_NTREE ? "NTree" : "BVH");
+  lsp_vulkan_address_table(plan, buffer_addresses, asset->sections);
+  asset->header = *scene->header;
+  asset->dial = lsp_dial(scene, options);
+  return lsp::succeed(error);
 }
 
 extern "C" void lsp_vulkan_layout_bindings(VkDescriptorSetLayoutBinding bindings[LSP_BINDING_COUNT]) {
@@ -150,25 +214,23 @@ extern "C" void lsp_vulkan_write_descriptors(const lsp_vulkan_functions* functio
                                              VkDescriptorSet set, const lsp_vulkan_plan* plan,
                                              const VkBuffer* buffers, VkBuffer rays, VkBuffer hits,
                                              VkBuffer counters) {
-  VkDescriptorBufferInfo infos[LSP_BINDING_COUNT];
-  for (VkDescriptorBufferInfo& info : infos) info = {buffers[0], 0, VK_WHOLE_SIZE};
+  VkBuffer bound[LSP_BINDING_COUNT];
+  std::fill_n(bound, LSP_BINDING_COUNT, buffers[0]);
   // With addresses the sections need no descriptors, and may be too large for them.
   for (uint32_t i = 0; i < plan->buffer_count && plan->addresses == 0; ++i) {
-    if (plan->buffers[i].binding < LSP_BINDING_COUNT) infos[plan->buffers[i].binding].buffer = buffers[i];
+    if (plan->buffers[i].binding < LSP_BINDING_COUNT) bound[plan->buffers[i].binding] = buffers[i];
   }
-  infos[LSP_BINDING_RAYS].buffer = rays;
-  infos[LSP_BINDING_HITS].buffer = hits;
-  if (counters != VK_NULL_HANDLE) infos[LSP_BINDING_COUNTERS].buffer = counters;
-  VkWriteDescriptorSet write{};
-  write.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
-  write.dstSet = set;
-  write.descriptorCount = 1;
-  write.descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
-  for (uint32_t i = 0; i < LSP_BINDING_COUNT; ++i) {
-    write.dstBinding = i;
-    write.pBufferInfo = &infos[i];
-    functions->update_descriptor_sets(device, 1, &write, 0, nullptr);
-  }
+  write_bindings(*functions, device, set, bound, rays, hits, counters);
+}
+
+extern "C" void lsp_vulkan_write_instance_descriptors(const lsp_vulkan_functions* functions, VkDevice device,
+                                                      VkDescriptorSet set, VkBuffer assets,
+                                                      VkBuffer instances, VkBuffer rays, VkBuffer hits,
+                                                      VkBuffer counters) {
+  VkBuffer bound[LSP_BINDING_COUNT];
+  std::fill_n(bound, LSP_BINDING_COUNT, assets);
+  bound[LSP_BINDING_INSTANCES] = instances;
+  write_bindings(*functions, device, set, bound, rays, hits, counters);
 }
 
 extern "C" uint32_t lsp_vulkan_max_rays(const lsp_vulkan_limits* limits) {
@@ -182,11 +244,13 @@ extern "C" uint32_t lsp_vulkan_max_rays(const lsp_vulkan_limits* limits) {
 extern "C" void lsp_vulkan_record_trace(const lsp_vulkan_functions* functions, VkCommandBuffer commands,
                                         VkPipeline pipeline, VkPipelineLayout layout, VkDescriptorSet set,
                                         const lsp_vulkan_trace_constants* constants) {
-  functions->cmd_bind_pipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline);
-  functions->cmd_bind_descriptor_sets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, layout, 0, 1, &set, 0,
-                                      nullptr);
-  functions->cmd_push_constants(commands, layout, VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof *constants,
-                                constants);
-  functions->cmd_dispatch(commands, (constants->count + LSP_VULKAN_GROUP_SIZE - 1) / LSP_VULKAN_GROUP_SIZE, 1,
-                          1);
+  record_dispatch(*functions, commands, pipeline, layout, set, constants, sizeof *constants,
+                  constants->count);
+}
+
+extern "C" void lsp_vulkan_record_instances(const lsp_vulkan_functions* functions, VkCommandBuffer commands,
+                                            VkPipeline pipeline, VkPipelineLayout layout, VkDescriptorSet set,
+                                            const lsp_vulkan_instance_constants* constants) {
+  record_dispatch(*functions, commands, pipeline, layout, set, constants, sizeof *constants,
+                  constants->count);
 }

@@ -140,6 +140,7 @@ SceneBuffers::SceneBuffers(SceneBuffers&& other) noexcept
       bytes_imported_(other.bytes_imported_),
       bytes_uploaded_(other.bytes_uploaded_) {
   std::copy(std::begin(other.handles_), std::end(other.handles_), handles_);
+  std::copy(std::begin(other.buffer_addresses_), std::end(other.buffer_addresses_), buffer_addresses_);
   std::fill(std::begin(other.handles_), std::end(other.handles_), VkBuffer{VK_NULL_HANDLE});
 }
 
@@ -228,15 +229,14 @@ SceneBuffers SceneBuffers::upload(Device& device, const lsp_scene& scene, uint32
 
 void SceneBuffers::write_addresses() {
   if (plan_.addresses == 0) return;
-  VkDeviceAddress buffers[LSP_VULKAN_MAX_BUFFERS] = {};
   for (uint32_t i = 0; i < plan_.buffer_count; ++i) {
     VkBufferDeviceAddressInfo info{};
     info.sType = VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO;
     info.buffer = handles_[i];
-    buffers[i] = device_->vk.vkGetBufferDeviceAddressKHR(device_->handle, &info);
+    buffer_addresses_[i] = device_->vk.vkGetBufferDeviceAddressKHR(device_->handle, &info);
   }
   VkDeviceAddress table[LSP_VULKAN_ADDRESS_COUNT];
-  lsp_vulkan_address_table(&plan_, buffers, table);
+  lsp_vulkan_address_table(&plan_, buffer_addresses_, table);
   addresses_ = Buffer(*device_, sizeof table, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT,
                       VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT, 0);
   memcpy(addresses_.mapped(), table, sizeof table);

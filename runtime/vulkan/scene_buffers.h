@@ -26,6 +26,8 @@ class SceneBuffers {
   const VkBuffer* handles() const { return handles_; }
   // The buffer with the sections' addresses; null where the plan does without.
   VkBuffer addresses() const { return addresses_.handle(); }
+  // Those of the buffers, in the plan's order; zero where the plan does without.
+  const VkDeviceAddress* buffer_addresses() const { return buffer_addresses_; }
   uint64_t bytes_imported() const { return bytes_imported_; }
   uint64_t bytes_uploaded() const { return bytes_uploaded_; }
 
@@ -38,6 +40,7 @@ class SceneBuffers {
   Device* device_;
   lsp_vulkan_plan plan_{};
   VkBuffer handles_[LSP_VULKAN_MAX_BUFFERS]{};
+  VkDeviceAddress buffer_addresses_[LSP_VULKAN_MAX_BUFFERS]{};
   Buffer addresses_;
   std::vector<Buffer> owned_;                 // upload: the buffers behind the handles
   VkDeviceMemory imported_ = VK_NULL_HANDLE;  // import: the one memory behind all buffers

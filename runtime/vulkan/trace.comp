@@ -1,9 +1,9 @@
 // One ray per invocation: rays from a buffer, hits into another. With LSP_COUNT defined, sums of the work done
 // are added to the counters. With LSP_ADDRESSES defined, the sections are read through buffer device addresses; with
-// LSP_NTREE, the base structure is an NTree; with LSP_CELLS, cells answer.
+// LSP_NTREE, the base structure is an NTree; with LSP_CELLS, cells answer; with LSP_INSTANCES, instances of files.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#ifdef LSP_ADDRESSES
+#if defined(LSP_ADDRESSES) || defined(LSP_INSTANCES)
 #extension GL_EXT_buffer_reference : require
 #extension GL_EXT_buffer_reference_uvec2 : require
 #endif
@@ -21,7 +21,11 @@ layout(std430, set = 0, binding = LSP_BINDING_HITS) writeonly buffer HitBuffer {
 // away, which matters most where a device runs both sides of every branch.
 layout(constant_id = LSP_VULKAN_FLAGS_CONSTANT) const uint kFlags = 0u;
 
+#ifdef LSP_INSTANCES
+layout(push_constant) uniform Constants { lsp_vulkan_instance_constants constants; };
+#else
 layout(push_constant) uniform Constants { lsp_vulkan_trace_constants constants; };
+#endif
 
 #ifdef LSP_COUNT
 layout(std430, set = 0, binding = LSP_BINDING_COUNTERS) buffer CounterBuffer { uint counter_words[]; };
@@ -41,7 +45,11 @@ void main() {
   uvec4 b = ray_words[2u * index + 1u];
   LspRay ray = LspRay(uintBitsToFloat(a.xyz), uintBitsToFloat(a.w), uintBitsToFloat(b.xyz), uintBitsToFloat(b.w));
 
+#ifdef LSP_INSTANCES
+  LspTraced traced = lsp_trace_ray_instances(constants.instance_count, ray, constants.mask, kFlags);
+#else
   LspTraced traced = lsp_trace_ray(lsp_bound_scene(), ray, kFlags, constants.lod, constants.dial);
+#endif
   LspHit hit = traced.hit;
 #ifdef LSP_COUNT
   if ((hit.flags & LSP_HIT_INCOMPLETE) == 0u) {  // an incomplete ray is traced, and counted, again

@@ -2,12 +2,13 @@
 #include <chrono>
 #include <cstddef>
 #include <cstring>
+#include <functional>
 #include <map>
 #include <memory>
 #include <tuple>
 
 #include "device.h"
-#include "instance_memory.h"
+#include "lsp/instances.hpp"
 #include "scene_buffers.h"
 
 namespace lsp {
@@ -30,6 +31,15 @@ static_assert(is_counter(offsetof(lsp_trace_counts, exact_nodes), LSP_COUNTER_EX
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+// What asks for any hit.
+constexpr uint32_t kAnyHit = LSP_TRACE_ANY_HIT | LSP_TRACE_OCCLUSION;
+
+// The parts of the shader that rays at this dial need of the scene.
+uint32_t parts_of(const lsp_scene& scene, uint32_t dial) {
+  const uint32_t parts = lsp_vulkan_parts(&scene);
+  return dial == LSP_DIAL_TABLES ? parts & ~LSP_PART_CELL_EXACT : parts;
 }
 
 void record_barrier(Device& device, VkCommandBuffer commands, VkPipelineStageFlags from,
@@ -56,14 +66,13 @@ class Shader {
   Shader(const Shader&) = delete;
   Shader& operator=(const Shader&) = delete;
 
-  // A pipeline for traces with `flags` of a scene with this plan, whose stack has `stack` entries and which
-  // needs these parts of the shader. The caller destroys it.
-  VkPipeline create_pipeline(const lsp_vulkan_plan& plan, bool counting, uint32_t flags, uint32_t stack,
+  // A pipeline of this SPIR-V for traces with `flags`, whose stack has `stack` entries and which needs these
+  // parts of the shader. The caller destroys it.
+  VkPipeline create_pipeline(const uint32_t* words, size_t bytes, uint32_t flags, uint32_t stack,
                              uint32_t parts) {
-    size_t bytes = 0;
     VkShaderModuleCreateInfo module_info{};
     module_info.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
-    module_info.pCode = lsp_vulkan_trace_spirv(&plan, counting ? 1 : 0, &bytes);
+    module_info.pCode = words;
     module_info.codeSize = bytes;
     VkShaderModule module = VK_NULL_HANDLE;
     check(device_.vk.vkCreateShaderModule(device_.handle, &module_info, nullptr, &module),
@@ -179,12 +188,23 @@ class Pipelines {
   VkPipeline get(lsp_vulkan_plan plan, bool counting, const lsp_vulkan_kind& kind) {
     plan.base_structure = kind.base_structure;
     VkPipeline& pipeline = made_[{kind.base_structure, plan.addresses, counting, kind.flags, kind.parts}];
-    if (pipeline == VK_NULL_HANDLE)
-      pipeline = shader_.create_pipeline(plan, counting, kind.flags, stack_, kind.parts);
-    return pipeline;
+    if (pipeline != VK_NULL_HANDLE) return pipeline;
+    size_t bytes = 0;
+    const uint32_t* words = lsp_vulkan_trace_spirv(&plan, counting ? 1 : 0, &bytes);
+    return pipeline = shader_.create_pipeline(words, bytes, kind.flags, stack_, kind.parts);
+  }
+  // The same of instances, whose assets need these parts of the shader.
+  VkPipeline get_instances(bool counting, uint32_t flags, uint32_t parts) {
+    VkPipeline& pipeline = made_[{kInstances, 1, counting, flags, parts}];
+    if (pipeline != VK_NULL_HANDLE) return pipeline;
+    size_t bytes = 0;
+    const uint32_t* words = lsp_vulkan_instances_spirv(counting ? 1 : 0, &bytes);
+    return pipeline = shader_.create_pipeline(words, bytes, flags, stack_, parts);
   }
 
  private:
+  static constexpr uint32_t kInstances = 0;  // no base structure's number
+
   Device& device_;
   Shader& shader_;
   uint32_t stack_;
@@ -248,6 +268,8 @@ class VulkanTracer::Impl {
   void load(std::span<const lsp_scene* const> scenes, uint32_t uses, LoadPath path, bool numbered);
   VulkanTrace trace(const lsp_trace_options& options, std::span<const LspRay> rays, std::span<LspHit> hits,
                     bool count, size_t scene);
+  VulkanTrace trace_instances(const lsp_instances& instances, const lsp_trace_options& options, uint32_t mask,
+                              std::span<const LspRay> rays, std::span<LspHit> hits, bool count);
 
   std::unique_ptr<Device> device;
   std::vector<Loaded> loaded;
@@ -264,20 +286,31 @@ class VulkanTracer::Impl {
   void load_next(const lsp_scene& scene, LoadPath path);
   bool try_import(const lsp_scene& scene, bool forced);
   void attach(const lsp_scene& scene, SceneBuffers&& buffers, bool imported);
-  double trace_batch(const Loaded& scene, const lsp_trace_options& options, const LspRay* rays, LspHit* hits,
-                     uint32_t count, bool counting);
-  void record_batch(const Loaded& scene, const lsp_trace_options& options, uint32_t count, bool counting);
-  static void retrace(const lsp_scene& scene, const lsp_trace_options& options, std::span<const LspRay> rays,
-                      std::span<LspHit> hits, bool count, VulkanTrace& result);
+  void try_instances();
+  void check_asset(const Loaded& asset) const;
+  void put_instances(const lsp_instances& instances, const lsp_trace_options& options);
+  // Records the dispatch that traces so many rays; its pipeline and set are ready.
+  using Record = std::function<void(VkCommandBuffer, uint32_t count)>;
+  // Traces one ray on the CPU, which adds to the counts unless they are null.
+  using Retrace = std::function<lsp_status(const LspRay&, LspHit&, lsp_trace_counts*, lsp_error*)>;
+  void begin_trace(std::span<const LspRay> rays, std::span<LspHit> hits);
+  uint32_t batch_rays() const { return std::min(lsp_vulkan_max_rays(&device->limits), kBatchRays); }
+  VulkanTrace trace_batches(const Record& record, const Retrace& retrace, std::span<const LspRay> rays,
+                            std::span<LspHit> hits, bool counting);
+  double trace_batch(const Record& record, const LspRay* rays, LspHit* hits, uint32_t count, bool counting);
+  void record_batch(const Record& record, uint32_t count);
 
   VulkanOptions options_;
   uint32_t uses_ = 0;
+  bool instanced_ = false;  // the scenes are assets of instances
   std::string name_;        // of the scene that is being loaded, before what is wrong with it
-  lsp_vulkan_kind kind_{};  // of the trace in progress
   std::unique_ptr<Shader> shader_;
   std::unique_ptr<Pipelines> pipelines_;
   Buffer counters_;
   BatchBuffers batch_;
+  Buffer assets_;     // an lsp_vulkan_asset for each that is loaded
+  Buffer instances_;  // as lsp_instances_build has filled it
+  VkDeviceSize instances_capacity_ = 0;
 };
 
 void VulkanTracer::Impl::open() {
@@ -289,6 +322,8 @@ void VulkanTracer::Impl::open() {
 
 void VulkanTracer::Impl::close() noexcept {
   unload();
+  instances_ = {};
+  instances_capacity_ = 0;
   batch_ = {};
   counters_ = {};
   shader_.reset();
@@ -297,12 +332,29 @@ void VulkanTracer::Impl::close() noexcept {
 
 void VulkanTracer::Impl::unload() noexcept {
   pipelines_.reset();
+  assets_ = {};
   loaded.clear();
 }
 
-// Adds the scene and traces one ray, so that a device that cannot read it fails here.
+// Whether the shader of instances can trace it for every use.
+void VulkanTracer::Impl::check_asset(const Loaded& asset) const {
+  for (const uint32_t use : {LSP_USE_EXACT, LSP_USE_APPROXIMATE}) {
+    if ((uses_ & use) == 0) continue;
+    lsp_trace_options options{};
+    if (use == LSP_USE_APPROXIMATE) options.flags = LSP_TRACE_APPROXIMATE;
+    lsp_vulkan_asset described;
+    lsp_error error;
+    const lsp_status status = lsp_vulkan_describe_asset(
+        &asset.scene, &asset.buffers.plan(), asset.buffers.buffer_addresses(), &options, &described, &error);
+    if (status != LSP_OK) throw Failure(static_cast<Exit>(status), "", error.message);
+  }
+}
+
+// Adds the scene and traces one ray, so that a device that cannot read it fails here. Of assets that is left
+// to try_instances: theirs is another shader, and to compile this one as well takes seconds on lavapipe.
 void VulkanTracer::Impl::attach(const lsp_scene& scene, SceneBuffers&& buffers, bool imported) {
   loaded.push_back({scene, std::move(buffers), imported});
+  if (instanced_) return;
   try {
     const LspRay ray{scene.header->bounds_min, 0.0f, {1.0f, 1.0f, 1.0f}, 3.402823e38f};
     LspHit hit;
@@ -313,6 +365,22 @@ void VulkanTracer::Impl::attach(const lsp_scene& scene, SceneBuffers&& buffers, 
     loaded.pop_back();
     throw;
   }
+}
+
+// Traces a ray through an instance of every asset.
+void VulkanTracer::Impl::try_instances() {
+  std::vector<const lsp_scene*> assets;
+  std::vector<lsp_instance> places;
+  for (const Loaded& asset : loaded) {
+    places.push_back({static_cast<uint32_t>(assets.size()), {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}, 0xFF, 0});
+    assets.push_back(&asset.scene);
+  }
+  const Instances instances(std::move(assets), places);
+  const float* corner = instances.view().nodes[0].lo;
+  const LspRay ray{{corner[0], corner[1], corner[2]}, 0.0f, {1.0f, 1.0f, 1.0f}, 3.402823e38f};
+  LspHit hit;
+  const uint32_t flags = (uses_ & LSP_USE_EXACT) != 0 ? 0 : LSP_TRACE_APPROXIMATE;
+  trace_instances(instances.view(), {flags, 0.0f, 0, 0.0f}, 0xFF, {&ray, 1}, {&hit, 1}, false);
 }
 
 bool VulkanTracer::Impl::try_import(const lsp_scene& scene, bool forced) {
@@ -352,6 +420,7 @@ void VulkanTracer::Impl::load_all(std::span<const lsp_scene* const> scenes, Load
     name_ = numbered ? "asset " + std::to_string(i) + ": " : "";
     try {
       load_next(*scenes[i], path);
+      if (numbered) check_asset(loaded.back());
     } catch (const DeviceLost&) {
       throw;
     } catch (const Failure& failure) {
@@ -359,12 +428,18 @@ void VulkanTracer::Impl::load_all(std::span<const lsp_scene* const> scenes, Load
       throw Failure(failure.exit(), failure.file(), name_ + failure.what());
     }
   }
+  if (numbered && !loaded.empty()) try_instances();
 }
 
 void VulkanTracer::Impl::load(std::span<const lsp_scene* const> scenes, uint32_t uses, LoadPath path,
                               bool numbered) {
   const auto start = std::chrono::steady_clock::now();
-  uses_ = uses | device->address_uses;
+  if (numbered && device->address_uses == 0)
+    throw Failure(Exit::kUnsupported, "",
+                  "instances need buffer addresses (bufferDeviceAddress), which the device lacks; trace them "
+                  "on the CPU");
+  instanced_ = numbered;
+  uses_ = uses | (numbered ? LSP_USE_ADDRESSES_ALWAYS : device->address_uses);
   load_note.clear();
   try {
     load_all(scenes, path, numbered);
@@ -383,8 +458,7 @@ void VulkanTracer::Impl::load(std::span<const lsp_scene* const> scenes, uint32_t
   load_seconds = seconds_since(start);
 }
 
-void VulkanTracer::Impl::record_batch(const Loaded& scene, const lsp_trace_options& options, uint32_t count,
-                                      bool counting) {
+void VulkanTracer::Impl::record_batch(const Record& record, uint32_t count) {
   constexpr VkPipelineStageFlagBits kCompute = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT;
   constexpr VkPipelineStageFlags kTransfer = VK_PIPELINE_STAGE_TRANSFER_BIT;
   const auto& vk = device->vk;
@@ -403,10 +477,7 @@ void VulkanTracer::Impl::record_batch(const Loaded& scene, const lsp_trace_optio
     vk.vkCmdResetQueryPool(commands, shader_->timer, 0, 2);
     vk.vkCmdWriteTimestamp(commands, kCompute, shader_->timer, 0);
   }
-  const lsp_vulkan_trace_constants constants{options.lod, 0, count, kind_.dial};
-  lsp_vulkan_record_trace(&device->functions, commands,
-                          pipelines_->get(scene.buffers.plan(), counting, kind_), shader_->layout,
-                          shader_->set, &constants);
+  record(commands, count);
   if (shader_->timer != VK_NULL_HANDLE) vk.vkCmdWriteTimestamp(commands, kCompute, shader_->timer, 1);
   if (batch_.staged()) {
     record_barrier(*device, commands, kCompute, VK_ACCESS_SHADER_WRITE_BIT, kTransfer,
@@ -419,11 +490,11 @@ void VulkanTracer::Impl::record_batch(const Loaded& scene, const lsp_trace_optio
 }
 
 // Returns the seconds in the shader.
-double VulkanTracer::Impl::trace_batch(const Loaded& scene, const lsp_trace_options& options,
-                                       const LspRay* rays, LspHit* hits, uint32_t count, bool counting) {
+double VulkanTracer::Impl::trace_batch(const Record& record, const LspRay* rays, LspHit* hits, uint32_t count,
+                                       bool counting) {
   memcpy(batch_.rays.mapped(), rays, size_t{count} * sizeof(LspRay));
   if (counting) memset(counters_.mapped(), 0, sizeof(lsp_trace_counts));
-  record_batch(scene, options, count, counting);
+  record_batch(record, count);
   device->submit_and_wait(shader_->commands, shader_->fence);
   memcpy(hits, batch_.hits.mapped(), size_t{count} * sizeof(LspHit));
   if (shader_->timer == VK_NULL_HANDLE) return 0;
@@ -434,39 +505,55 @@ double VulkanTracer::Impl::trace_batch(const Loaded& scene, const lsp_trace_opti
   return static_cast<double>(ticks[1] - ticks[0]) * device->seconds_per_tick;
 }
 
-void VulkanTracer::Impl::retrace(const lsp_scene& scene, const lsp_trace_options& options,
-                                 std::span<const LspRay> rays, std::span<LspHit> hits, bool count,
-                                 VulkanTrace& result) {
+// Makes room for rays and hits.
+void VulkanTracer::Impl::begin_trace(std::span<const LspRay> rays, std::span<LspHit> hits) {
+  if (hits.size() != rays.size()) throw Failure(Exit::kInternal, "", "as many hits as rays are needed");
+  const auto capacity = static_cast<uint32_t>(std::min<size_t>(rays.size(), batch_rays()));
+  if (capacity <= batch_.capacity) return;
+  batch_ = {};  // before the new ones are made, not after
+  batch_ = BatchBuffers(*device, capacity);
+}
+
+VulkanTrace VulkanTracer::Impl::trace_batches(const Record& record, const Retrace& retrace,
+                                              std::span<const LspRay> rays, std::span<LspHit> hits,
+                                              bool counting) {
+  VulkanTrace result;
+  const uint32_t most = batch_rays();
+  for (size_t first = 0; first < rays.size(); first += most) {
+    const auto size = static_cast<uint32_t>(std::min<size_t>(rays.size() - first, most));
+    result.gpu_seconds += trace_batch(record, &rays[first], &hits[first], size, counting);
+    if (counting) {
+      lsp_trace_counts counts;
+      memcpy(&counts, counters_.mapped(), sizeof counts);
+      lsp_add_counts(&result.counts, &counts);
+    }
+    ++result.batches;
+  }
   for (size_t i = 0; i < hits.size(); ++i) {
     if ((hits[i].flags & LSP_HIT_INCOMPLETE) == 0) continue;
     lsp_trace_counts counts{};
     lsp_error error;
-    const lsp_status status =
-        lsp_trace(&scene, &options, &rays[i], &hits[i], 1, count ? &counts : nullptr, &error);
+    const lsp_status status = retrace(rays[i], hits[i], counting ? &counts : nullptr, &error);
     if (status != LSP_OK) throw Failure(static_cast<Exit>(status), "", error.message);
     ++result.retraced;
     lsp_add_counts(&result.counts, &counts);
   }
+  result.counts.rays = rays.size();  // those retraced are not counted twice
+  return result;
 }
 
 VulkanTrace VulkanTracer::Impl::trace(const lsp_trace_options& options, std::span<const LspRay> rays,
                                       std::span<LspHit> hits, bool count, size_t number) {
   if (number >= loaded.size())
     throw Failure(Exit::kUnsupported, "", "the scene is not loaded for this kind of trace");
-  if (hits.size() != rays.size()) throw Failure(Exit::kInternal, "", "as many hits as rays are needed");
+  const auto start = std::chrono::steady_clock::now();
+  begin_trace(rays, hits);
   const Loaded& scene = loaded[number];
+  lsp_vulkan_kind kind;
   lsp_error error;
   const lsp_status status =
-      lsp_vulkan_plan_trace(&scene.scene, &scene.buffers.plan(), &options, &kind_, &error);
+      lsp_vulkan_plan_trace(&scene.scene, &scene.buffers.plan(), &options, &kind, &error);
   if (status != LSP_OK) throw Failure(static_cast<Exit>(status), "", error.message);
-  const auto start = std::chrono::steady_clock::now();
-  VulkanTrace result;
-  const uint32_t most = std::min(lsp_vulkan_max_rays(&device->limits), kBatchRays);
-  const auto capacity = static_cast<uint32_t>(std::min<size_t>(rays.size(), most));
-  if (capacity > batch_.capacity) {
-    batch_ = {};  // before the new ones are made, not after
-    batch_ = BatchBuffers(*device, capacity);
-  }
   lsp_vulkan_write_descriptors(&device->functions, device->handle, shader_->set, &scene.buffers.plan(),
                                scene.buffers.handles(), batch_.shader_rays(), batch_.shader_hits(),
                                counters_.handle());
@@ -474,23 +561,88 @@ VulkanTrace VulkanTracer::Impl::trace(const lsp_trace_options& options, std::spa
     lsp_vulkan_write_address_table(&device->functions, device->handle, shader_->set,
                                    scene.buffers.addresses());
   }
-  for (size_t first = 0; first < rays.size(); first += most) {
-    const auto size = static_cast<uint32_t>(std::min<size_t>(rays.size() - first, most));
-    result.gpu_seconds += trace_batch(scene, options, &rays[first], &hits[first], size, count);
-    if (count) {
-      lsp_trace_counts counts;
-      memcpy(&counts, counters_.mapped(), sizeof counts);
-      lsp_add_counts(&result.counts, &counts);
-    }
-    ++result.batches;
-  }
+  const VkPipeline pipeline = pipelines_->get(scene.buffers.plan(), count, kind);
+  const auto record = [&](VkCommandBuffer commands, uint32_t size) {
+    const lsp_vulkan_trace_constants constants{options.lod, 0, size, kind.dial};
+    lsp_vulkan_record_trace(&device->functions, commands, pipeline, shader_->layout, shader_->set,
+                            &constants);
+  };
   lsp_trace_options again = options;
-  if (kind_.dial == LSP_DIAL_TABLES) {  // perhaps because no more is loaded
+  if (kind.dial == LSP_DIAL_TABLES) {  // perhaps because no more is loaded
     again.flags |= LSP_TRACE_MAX_LOSS;
     again.max_loss = 100;
   }
-  retrace(scene.scene, again, rays, hits, count, result);
-  result.counts.rays = rays.size();  // those retraced are not counted twice
+  const auto retrace = [&](const LspRay& ray, LspHit& hit, lsp_trace_counts* counts, lsp_error* error) {
+    return lsp_trace(&scene.scene, &again, &ray, &hit, 1, counts, error);
+  };
+  VulkanTrace result = trace_batches(record, retrace, rays, hits, count);
+  result.seconds = seconds_since(start);
+  return result;
+}
+
+// Brings the assets, with the dial of the options, and the instances to the device.
+void VulkanTracer::Impl::put_instances(const lsp_instances& instances, const lsp_trace_options& options) {
+  constexpr VkMemoryPropertyFlags kNear = VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT;
+  std::vector<lsp_vulkan_asset> described(std::max<size_t>(loaded.size(), 1));
+  for (size_t i = 0; i < loaded.size(); ++i) {
+    const SceneBuffers& buffers = loaded[i].buffers;
+    lsp_error error;
+    const lsp_status status = lsp_vulkan_describe_asset(
+        &loaded[i].scene, &buffers.plan(), buffers.buffer_addresses(), &options, &described[i], &error);
+    if (status != LSP_OK)
+      throw Failure(static_cast<Exit>(status), "", "asset " + std::to_string(i) + ": " + error.message);
+  }
+  const size_t bytes = described.size() * sizeof described[0];
+  if (assets_.handle() == VK_NULL_HANDLE)
+    assets_ = Buffer(*device, bytes, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, kHost, kNear);
+  memcpy(assets_.mapped(), described.data(), bytes);
+  const VkDeviceSize size = lsp_instances_bytes(instances.count);
+  if (size > device->limits.max_storage_buffer_range)
+    throw Failure(Exit::kLimit, "",
+                  std::to_string(instances.count) + " instances have " + std::to_string(size) +
+                      " bytes, storage buffers of this device at most " +
+                      std::to_string(device->limits.max_storage_buffer_range) + "; trace them on the CPU");
+  if (size > instances_capacity_ || instances_.handle() == VK_NULL_HANDLE) {
+    instances_ = {};
+    instances_ =
+        Buffer(*device, std::max<VkDeviceSize>(size, 16), VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, kHost, kNear);
+    instances_capacity_ = size;
+  }
+  if (size > 0) memcpy(instances_.mapped(), instances.records, size);
+}
+
+VulkanTrace VulkanTracer::Impl::trace_instances(const lsp_instances& instances,
+                                                const lsp_trace_options& wanted, uint32_t mask,
+                                                std::span<const LspRay> rays, std::span<LspHit> hits,
+                                                bool count) {
+  if (instances.count > 0 && instances.asset_count != loaded.size())
+    throw Failure(Exit::kInternal, "", "the instances' assets are not those that were loaded");
+  const auto start = std::chrono::steady_clock::now();
+  const uint32_t needed = (wanted.flags & LSP_TRACE_APPROXIMATE) != 0 ? LSP_USE_APPROXIMATE : LSP_USE_EXACT;
+  if ((uses_ & needed) != needed)
+    throw Failure(Exit::kUnsupported, "", "the scene is not loaded for this kind of trace");
+  begin_trace(rays, hits);
+  put_instances(instances, wanted);
+  lsp_vulkan_write_instance_descriptors(&device->functions, device->handle, shader_->set, assets_.handle(),
+                                        instances_.handle(), batch_.shader_rays(), batch_.shader_hits(),
+                                        counters_.handle());
+  uint32_t flags = wanted.flags & kAnyHit, parts = 0;
+  if ((flags & LSP_TRACE_OCCLUSION) != 0) flags |= LSP_TRACE_ANY_HIT;
+  for (const Loaded& asset : loaded) {
+    parts |= parts_of(asset.scene, lsp_dial(&asset.scene, &wanted));
+    // Wide nodes alone answer every ray exactly: the same pipeline.
+    if (asset.scene.header->base_structure == LSP_BASE_CELLS) flags |= wanted.flags & LSP_TRACE_APPROXIMATE;
+  }
+  const VkPipeline pipeline = pipelines_->get_instances(count, flags, parts);
+  const auto record = [&](VkCommandBuffer commands, uint32_t size) {
+    const lsp_vulkan_instance_constants constants{instances.count, 0, size, mask};
+    lsp_vulkan_record_instances(&device->functions, commands, pipeline, shader_->layout, shader_->set,
+                                &constants);
+  };
+  const auto retrace = [&](const LspRay& ray, LspHit& hit, lsp_trace_counts* counts, lsp_error* error) {
+    return lsp_trace_instances(&instances, &wanted, mask, &ray, &hit, 1, counts, error);
+  };
+  VulkanTrace result = trace_batches(record, retrace, rays, hits, count);
   result.seconds = seconds_since(start);
   return result;
 }
@@ -514,6 +666,12 @@ void VulkanTracer::load(std::span<const lsp_scene* const> assets, uint32_t uses,
 VulkanTrace VulkanTracer::trace(const lsp_trace_options& options, std::span<const LspRay> rays,
                                 std::span<LspHit> hits, bool count, size_t scene) {
   return impl_->trace(options, rays, hits, count, scene);
+}
+
+VulkanTrace VulkanTracer::trace_instances(const lsp_instances& instances, const lsp_trace_options& options,
+                                          uint32_t mask, std::span<const LspRay> rays, std::span<LspHit> hits,
+                                          bool count) {
+  return impl_->trace_instances(instances, options, mask, rays, hits, count);
 }
 
 size_t VulkanTracer::scene_count() const { return impl_->loaded.size(); }

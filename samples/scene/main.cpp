@@ -18,8 +18,8 @@ int main(int argc, char** argv) {
   bool no_masks = false;
   add_common_options(app, kProgram, common);
   app.add_option("OUT.glb", output, "The file to write")->required();
-  app.add_option("--scene", name, "atrium, grove, spheres or plane")
-      ->check(CLI::IsMember({"atrium", "grove", "spheres", "plane"}));
+  app.add_option("--scene", name, "atrium, grove, spheres, plane, objects (512 in a room) or stadium")
+      ->check(CLI::IsMember({"atrium", "grove", "spheres", "plane", "objects", "stadium"}));
   app.add_option("--triangles", triangles, "About how many triangles (default: as fine as looks good)")
       ->check(CLI::Range(uint64_t{1000}, uint64_t{20'000'000}));
   app.add_flag("--no-masks", no_masks, "Leave out the masks of leaves: cards are then solid");

@@ -72,7 +72,10 @@ Scene make_scene(const std::string& name, const Detail& detail) {
   if (name == "grove") return make_grove(detail);
   if (name == "spheres") return make_spheres(detail);
   if (name == "plane") return make_plane(detail);
-  throw Failure(Exit::kUsage, "", "there is no scene '" + name + "'; choose atrium, grove, spheres or plane");
+  if (name == "objects") return make_objects(detail);
+  if (name == "stadium") return make_stadium(detail);
+  throw Failure(Exit::kUsage, "",
+                "there is no scene '" + name + "'; choose atrium, grove, spheres, plane, objects or stadium");
 }
 
 void take_masks_off(Scene& scene) {

@@ -72,12 +72,15 @@ struct Detail {
   bool shows(float from) const { return scale >= from; }
 };
 
-// The scenes, by name: "atrium", "grove", "spheres", "plane". An unknown name throws lsp::Failure.
+// The scenes, by name: "atrium", "grove", "spheres", "plane", "objects", "stadium". An unknown name throws
+// lsp::Failure.
 Scene make_scene(const std::string& name, const Detail& detail);
 Scene make_atrium(const Detail& detail);
 Scene make_grove(const Detail& detail);
 Scene make_spheres(const Detail& detail);
 Scene make_plane(const Detail& detail);
+Scene make_objects(const Detail& detail);
+Scene make_stadium(const Detail& detail);
 
 // Leaves and whatever else has a mask become solid.
 void take_masks_off(Scene& scene);

@@ -43,6 +43,8 @@ const Baked& Context::cells(SceneUnderTest& scene) const {
   return OpenFile(baked.path).has_cells() ? baked : or_throw(scene.bake(kCells), scene);
 }
 
+Bake Context::instance_bake() const { return quick ? kQuickCells : kDefault; }
+
 void Context::say_what_cells_are(SceneUnderTest& scene, Section& section) const {
   if (quick || scene.is_file() || OpenFile(or_throw(scene.bake(kDefault), scene).path).has_cells()) return;
   section.paragraphs.push_back(scene.name() +

@@ -38,6 +38,8 @@ struct Context {
   // the file that was given, whatever it has. Where the default leaves tables out, with --base cells; of a
   // quick run 8 cells along the longest side. Throws Failure where there is none.
   const Baked& cells(SceneUnderTest& scene) const;
+  // What scenes are baked with, merged and as instances: the default, of a quick run coarse cells.
+  Bake instance_bake() const;
   // Says in `section` where the default has left tables out.
   void say_what_cells_are(SceneUnderTest& scene, Section& section) const;
   // Fewer once half of the half hour is over: a slow machine's report shall end in time too.
@@ -73,6 +75,7 @@ Section scaling_suite(Context& context);
 Section peers_suite(Context& context);
 Section stress_suite(Context& context);
 Section pictures_suite(Context& context);
+Section instances_suite(Context& context);
 
 double mega(size_t rays, const Timing& timing);  // million rays a second
 

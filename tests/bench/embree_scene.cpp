@@ -127,11 +127,6 @@ void closest_packets(std::span<const LspRay> rays, std::span<LspHit> hits,
   }
 }
 
-LspHit to_hit(const RTCRayHit& query, const std::vector<uint32_t>& primitives) {
-  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {INFINITY, LSP_NONE, 0, 0, {0, 0, 0}, 0};
-  return {query.ray.tfar, primitives[query.hit.primID], query.hit.u, query.hit.v, {0, 0, 0}, 0};
-}
-
 constexpr size_t kStreamRays = 1024;
 
 // A hit is none where the ray passes the triangle.
@@ -181,19 +176,27 @@ bool come_nearer(RTCPointQueryFunctionArguments* args) {
 
 const char* EmbreeScene::version() { return RTC_VERSION_STRING; }
 
-EmbreeScene::EmbreeScene(const Soup& soup, EmbreeMode mode, unsigned threads)
-    : allocated_(std::make_unique<int64_t>(0)) {
+void EmbreeScene::open(unsigned threads) {
   const std::string config = threads ? "threads=" + std::to_string(threads) : "";
   device_.reset(rtcNewDevice(config.c_str()));
   if (!device_) fail(nullptr);
   rtcSetDeviceMemoryMonitorFunction(device_.get(), add_allocated, allocated_.get());
-  scene_.reset(rtcNewScene(device_.get()));
-  rtcSetSceneFlags(scene_.get(), mode == EmbreeMode::kRobust ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE);
-  rtcSetSceneBuildQuality(scene_.get(), RTC_BUILD_QUALITY_HIGH);
+}
 
+std::unique_ptr<std::remove_pointer_t<RTCScene>, EmbreeScene::ReleaseScene> EmbreeScene::new_scene(
+    EmbreeMode mode) const {
+  RTCScene scene = rtcNewScene(device_.get());
+  rtcSetSceneFlags(scene, mode == EmbreeMode::kRobust ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE);
+  rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
+  return std::unique_ptr<std::remove_pointer_t<RTCScene>, ReleaseScene>(scene);
+}
+
+// Answers Embree's own copy of the corners.
+const glm::vec3* EmbreeScene::add_triangles(RTCScene scene, const Soup& soup) {
   RTCGeometry geometry = rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE);
+  glm::vec3* vertices = nullptr;
   if (soup.size() > 0) {
-    auto* vertices = static_cast<glm::vec3*>(
+    vertices = static_cast<glm::vec3*>(
         rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, 3 * soup.size()));
     auto* indices = static_cast<uint32_t*>(
         rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, soup.size()));
@@ -202,7 +205,6 @@ EmbreeScene::EmbreeScene(const Soup& soup, EmbreeMode mode, unsigned threads)
       for (size_t k = 0; k < 3; ++k) vertices[3 * i + k] = soup.corners[i][k];
     }
     for (uint32_t i = 0; i < 3 * soup.size(); ++i) indices[i] = i;
-    corners_ = vertices;
   }
   if (!soup.gaps.empty()) {
     gaps_ = std::make_unique<Soup>(soup);
@@ -211,14 +213,64 @@ EmbreeScene::EmbreeScene(const Soup& soup, EmbreeMode mode, unsigned threads)
     rtcSetGeometryOccludedFilterFunction(geometry, drop_passed);
   }
   rtcCommitGeometry(geometry);
-  rtcAttachGeometry(scene_.get(), geometry);
+  rtcAttachGeometry(scene, geometry);
   rtcReleaseGeometry(geometry);
+  return vertices;
+}
+
+void EmbreeScene::commit() {
   const auto start = std::chrono::steady_clock::now();
+  for (const auto& asset : asset_scenes_) rtcCommitScene(asset.get());
   rtcCommitScene(scene_.get());
   build_seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (rtcGetDeviceError(device_.get()) != RTC_ERROR_NONE) fail(device_.get());
   bytes_ = static_cast<uint64_t>(*allocated_);
-  primitives_ = soup.primitives;
+}
+
+EmbreeScene::EmbreeScene(const Soup& soup, EmbreeMode mode, unsigned threads)
+    : allocated_(std::make_unique<int64_t>(0)), primitives_(soup.primitives) {
+  open(threads);
+  scene_ = new_scene(mode);
+  corners_ = add_triangles(scene_.get(), soup);
+  commit();
+}
+
+EmbreeScene::EmbreeScene(std::span<const Soup> assets, std::span<const lsp_instance> instances,
+                         std::span<const uint32_t> first, EmbreeMode mode, unsigned threads)
+    : allocated_(std::make_unique<int64_t>(0)) {
+  open(threads);
+  for (const Soup& soup : assets) {
+    // Rays are in the asset's space there: the filter would hash others than ours.
+    if (!soup.gaps.empty())
+      throw Failure(Exit::kUnsupported, "", "triangles that are there in part have no instances here");
+    asset_scenes_.push_back(new_scene(mode));
+    add_triangles(asset_scenes_.back().get(), soup);
+    asset_primitives_.push_back(soup.primitives);
+  }
+  scene_ = new_scene(mode);
+  for (size_t i = 0; i < instances.size(); ++i) {
+    const lsp_instance& instance = instances[i];
+    instances_.push_back({instance.asset, first[i]});
+    RTCGeometry geometry = rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_INSTANCE);
+    rtcSetGeometryInstancedScene(geometry, asset_scenes_[instance.asset].get());
+    rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_ROW_MAJOR, instance.transform);
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometryByID(scene_.get(), geometry, static_cast<unsigned>(i));
+    rtcReleaseGeometry(geometry);
+  }
+  commit();
+}
+
+LspHit EmbreeScene::to_hit(const RTCRayHit& query) const {
+  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {INFINITY, LSP_NONE, 0, 0, {0, 0, 0}, 0};
+  uint32_t primitive = 0;
+  if (instances_.empty()) {
+    primitive = primitives_[query.hit.primID];
+  } else {
+    const Instance& instance = instances_[query.hit.instID[0]];
+    primitive = instance.first + asset_primitives_[instance.asset][query.hit.primID];
+  }
+  return {query.ray.tfar, primitive, query.hit.u, query.hit.v, {0, 0, 0}, 0};
 }
 
 float EmbreeScene::distance(const glm::vec3& point, float at_most) const {
@@ -253,7 +305,7 @@ void EmbreeScene::closest(std::span<const LspRay> rays, std::span<LspHit> hits, 
         queries[k].hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
       }
       rtcIntersect1M(scene, &context, queries.get(), static_cast<unsigned>(count), sizeof(RTCRayHit));
-      for (size_t k = 0; k < count; ++k) hits[i + k] = to_hit(queries[k], primitives_);
+      for (size_t k = 0; k < count; ++k) hits[i + k] = to_hit(queries[k]);
     }
   } else {
     RTCRayHit query;
@@ -262,7 +314,7 @@ void EmbreeScene::closest(std::span<const LspRay> rays, std::span<LspHit> hits, 
       query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
       query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
       rtcIntersect1(scene, &context, &query);
-      hits[i] = to_hit(query, primitives_);
+      hits[i] = to_hit(query);
     }
   }
 }

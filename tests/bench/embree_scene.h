@@ -5,7 +5,9 @@
 
 #include <memory>
 #include <span>
+#include <vector>
 
+#include "lsp/lsp_instances.h"
 #include "soup.h"
 
 namespace lsp::bench {
@@ -22,8 +24,13 @@ class EmbreeScene {
   // `threads` bounds the build's threads only; 0: all. Throws Failure(kInternal) with Embree's own words.
   explicit EmbreeScene(const Soup& soup, EmbreeMode mode = EmbreeMode::kRobust, unsigned threads = 0);
 
+  // Of instances of `assets`, as Embree has them: a scene of its own for each asset, and one over them.
+  // Primitive numbers are those of one mesh of all of them: those of instance i begin at first[i].
+  EmbreeScene(std::span<const Soup> assets, std::span<const lsp_instance> instances,
+              std::span<const uint32_t> first, EmbreeMode mode = EmbreeMode::kRobust, unsigned threads = 0);
+
   // Closest hits of rays[i] into hits[i] (t, primitive, u, v; the normal is left zero), in this thread, with
-  // denormals flushed to zero during the call as Embree asks for.
+  // denormals flushed to zero during the call as Embree asks for. Through instances one ray a call.
   void closest(std::span<const LspRay> rays, std::span<LspHit> hits,
                EmbreeCall call = EmbreeCall::kSingle) const;
 
@@ -45,12 +52,24 @@ class EmbreeScene {
   struct ReleaseScene {
     void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
   };
+  void open(unsigned threads);
+  std::unique_ptr<std::remove_pointer_t<RTCScene>, ReleaseScene> new_scene(EmbreeMode mode) const;
+  const glm::vec3* add_triangles(RTCScene scene, const Soup& soup);
+  void commit();
+  LspHit to_hit(const RTCRayHit& query) const;
+
   std::unique_ptr<int64_t> allocated_;  // outlives the device, whose monitor adds to it
   std::unique_ptr<std::remove_pointer_t<RTCDevice>, ReleaseDevice> device_;
   std::unique_ptr<std::remove_pointer_t<RTCScene>, ReleaseScene> scene_;
   std::unique_ptr<Soup> gaps_;          // none: all is solid
   const glm::vec3* corners_ = nullptr;  // three a triangle, Embree's own copy
   std::vector<uint32_t> primitives_;    // Embree's number to import number
+  struct Instance {
+    uint32_t asset, first;
+  };
+  std::vector<Instance> instances_;  // none: there is one mesh
+  std::vector<std::unique_ptr<std::remove_pointer_t<RTCScene>, ReleaseScene>> asset_scenes_;
+  std::vector<std::vector<uint32_t>> asset_primitives_;
   double build_seconds_ = 0;
   uint64_t bytes_ = 0;
 };

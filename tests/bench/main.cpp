@@ -27,9 +27,10 @@ struct Suite {
   const char* name;
   Section (*run)(Context&);
 };
-constexpr Suite kSuites[] = {{"pareto", pareto_suite},   {"peers", peers_suite},
-                             {"paper", paper_suite},     {"pictures", pictures_suite},
-                             {"scaling", scaling_suite}, {"stress", stress_suite}};
+constexpr Suite kSuites[] = {{"pareto", pareto_suite},      {"peers", peers_suite},
+                             {"paper", paper_suite},        {"pictures", pictures_suite},
+                             {"scaling", scaling_suite},    {"stress", stress_suite},
+                             {"instances", instances_suite}};
 
 // What the run has used so far: this process and the programs that it ran.
 struct Cost {
@@ -215,9 +216,10 @@ int main(int argc, char** argv) {
                  "Folder for the report; bakes go to its subfolder bakes, where a later run finds them")
       ->required();
   app.add_option("--suite", arguments.suites,
-                 "paper, pareto, scaling, peers, stress or pictures; may be repeated (default: all; of six "
+                 "paper, pareto, scaling, peers, stress, pictures or instances; may be repeated (default: "
+                 "all; of six "
                  "scenes on two cores that is more than half an hour)")
-      ->check(CLI::IsMember({"paper", "pareto", "scaling", "peers", "stress", "pictures"}));
+      ->check(CLI::IsMember({"paper", "pareto", "scaling", "peers", "stress", "pictures", "instances"}));
   app.add_flag("--quick", arguments.quick,
                "Fewer rays, bakes, sizes and pictures: a few minutes for six scenes");
   app.add_flag("--large", arguments.large, "In the paper's table also what takes gigabytes a scene");

@@ -57,6 +57,7 @@ class SceneUnderTest {
                  const Bake& first = line_space_bake(6, 9), const std::string& name = "");
 
   const std::string& name() const { return name_; }
+  const std::filesystem::path& input() const { return input_; }
   bool is_file() const { return is_file_; }  // given as .lsp: there is one bake only
   const Soup& soup() const { return soup_; }
   const EmbreeScene& reference() const { return *reference_; }

@@ -2,7 +2,8 @@
 # translate.sh SOURCE_DIR WORK_DIR GLSLC
 #
 # The shader include in other languages: what reads a scene over descriptors becomes HLSL for shader model 6.0, which
-# compiles (by glslc, which knows the language), and Metal's, through SPIRV-Cross. Exit 77: that is not here.
+# compiles (by glslc, which knows the language), and Metal's, through SPIRV-Cross; instances become Metal's. Exit 77: that
+# is not here.
 set -euo pipefail
 source=$1 work=$2 glslc=$3
 if ! command -v spirv-cross >/dev/null; then
@@ -27,3 +28,9 @@ translate bvh "$source/runtime/vulkan/trace.comp"
 translate ntree "$source/runtime/vulkan/trace.comp" -DLSP_NTREE
 translate cells "$source/runtime/vulkan/trace.comp" -DLSP_CELLS
 translate wide "$source/runtime/vulkan/trace.comp" -DLSP_WIDE
+
+# Instances are read through addresses, which HLSL of SPIRV-Cross does not know.
+"$glslc" -O --target-env=vulkan1.1 "${includes[@]}" -DLSP_INSTANCES -o instances.spv "$source/runtime/vulkan/trace.comp"
+spirv-cross instances.spv --msl --msl-version 20300 --output instances.metal
+grep -q '^kernel void main0(' instances.metal
+echo "instances: Metal $(wc -l <instances.metal) lines"

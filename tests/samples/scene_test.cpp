@@ -18,14 +18,33 @@ TEST(SampleScene, AtriumStaysInItsBudget) {
 }
 
 TEST(SampleScene, SameBytesTwice) {
-  for (const char* name : {"atrium", "grove", "spheres", "plane"}) {
+  for (const char* name : {"atrium", "grove", "spheres", "plane", "objects", "stadium"}) {
     EXPECT_EQ(to_glb(make_scene(name, {0.4f})), to_glb(make_scene(name, {0.4f}))) << name;
   }
 }
 
+// A room and 512 things of five kinds, some mirrored; a teapot far smaller than where it stands.
+TEST(SampleScene, WhatInstancesAreFor) {
+  const Scene objects = make_objects({0.3f}), stadium = make_stadium({});
+  EXPECT_EQ(objects.meshes.size(), 6u);
+  EXPECT_EQ(objects.nodes.size(), 513u);
+  size_t mirrored = 0;
+  for (const Node& node : objects.nodes) mirrored += node.scale.x < 0;
+  EXPECT_GT(mirrored, 60u);
+  EXPECT_LT(mirrored, 150u);
+  const auto extent = [&](size_t mesh) {
+    glm::vec3 hi(-1e30f);
+    for (const glm::vec3& p : stadium.meshes[mesh].parts[0].surface.positions) hi = glm::max(hi, p);
+    return hi;
+  };
+  ASSERT_EQ(stadium.meshes.size(), 2u);
+  EXPECT_GT(extent(0).x, 50.0f);
+  EXPECT_NEAR(extent(1).y, 0.3f, 1e-4f);
+}
+
 TEST(SampleScene, TessellationMeetsTheWish) {
   for (const uint64_t wish : {3'000u, 30'000u, 200'000u}) {
-    for (const char* name : {"grove", "spheres", "plane"}) {
+    for (const char* name : {"grove", "spheres", "plane", "stadium"}) {
       const double have = static_cast<double>(triangle_count(make_scene(name, detail_for(name, wish))));
       EXPECT_NEAR(have / static_cast<double>(wish), 1.0, 0.25) << name << " of " << wish;
     }

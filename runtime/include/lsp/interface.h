@@ -24,6 +24,11 @@ LSP_END(LspHit)
 
 #define LSP_HIT_INSTANCE_SHIFT 8u /* of LspHit.flags: the instance's number begins here */
 
+/* The tree over instances: nodes from its root to an instance at most, and so what a ray's stack holds; and of a node's
+ * child, that it is an instance's number. */
+#define LSP_INSTANCE_DEPTH 32u
+#define LSP_INSTANCE_BIT 0x80000000u
+
 #define LSP_HIT_LINE_SPACE 0x1u    /* answered by a Line Space */
 #define LSP_HIT_ORIGIN_INSIDE 0x2u /* the origin lies inside that Line Space's node */
 
@@ -80,6 +85,9 @@ LSP_END(LspHit)
 #define LSP_BINDING_FILLED_CELLS 9
 #define LSP_BINDING_PLANE_RECORDS 10
 #define LSP_BINDING_CELL_NODES 11
+/* Through instances there are two in place of these. */
+#define LSP_BINDING_ASSETS 0    /* lsp_vulkan_asset, read */
+#define LSP_BINDING_INSTANCES 1 /* the memory of lsp_instances_build, read */
 #define LSP_BINDING_RAYS 12     /* LspRay, read */
 #define LSP_BINDING_HITS 13     /* LspHit, written */
 #define LSP_BINDING_COUNTERS 14 /* lsp_trace_counts, added to; only the counting shader uses it */
@@ -107,6 +115,14 @@ LSP_BEGIN(lsp_vulkan_trace_constants)
   LSP_UINT dial; /* lsp_dial */
 LSP_END(lsp_vulkan_trace_constants)
 
+/* The same through instances. */
+LSP_BEGIN(lsp_vulkan_instance_constants)
+  LSP_UINT instance_count; /* lsp_instances.count */
+  LSP_UINT first; /* ray */
+  LSP_UINT count; /* of rays, one an invocation */
+  LSP_UINT mask; /* as of lsp_trace_instances */
+LSP_END(lsp_vulkan_instance_constants)
+
 /* Fields of lsp_trace_counts, which the counting shader adds to; the first, the rays, the host knows. */
 #define LSP_COUNTER_INVALID 1u
 #define LSP_COUNTER_HITS 2u
@@ -118,10 +134,12 @@ LSP_END(lsp_vulkan_trace_constants)
 #define LSP_COUNTER_EXACT_NODES 8u
 
 #if defined(__cplusplus)
-static_assert(sizeof(LspRay) == 32 && sizeof(LspHit) == 32 && sizeof(lsp_vulkan_trace_constants) == 16);
+static_assert(sizeof(LspRay) == 32 && sizeof(LspHit) == 32 && sizeof(lsp_vulkan_trace_constants) == 16 &&
+              sizeof(lsp_vulkan_instance_constants) == 16);
 #elif !defined(GL_core_profile)
 _Static_assert(sizeof(LspRay) == 32 && sizeof(LspHit) == 32, "as in ray and hit files and in shaders");
 _Static_assert(sizeof(lsp_vulkan_trace_constants) == 16, "as in shaders");
+_Static_assert(sizeof(lsp_vulkan_instance_constants) == 16, "as in shaders");
 #endif
 
 #endif /* LSP_INTERFACE_H */

@@ -8,6 +8,7 @@
  *   #define LSP_CELLS                // or it has cells, and the rays are approximate
  *   #define LSP_WIDE                 // or exact, and the scene has wide nodes (LSP_FEATURE_WIDE)
  *   #define LSP_ADDRESSES            // sections are read through addresses, see lsp_addresses.glsl
+ *   #define LSP_INSTANCES            // a scene of instances of many files, see lsp_instances.glsl
  *   #include "lsp/lsp.glsl"
  *
  *   LspHit hit = lsp_trace(lsp_bound_scene(), ray, LSP_TRACE_APPROXIMATE, 0.0);
@@ -57,9 +58,15 @@ layout(constant_id = LSP_PARTS_CONSTANT_ID) const uint lsp_parts = 0xFFFFFFFFu;
 #define LSP_PARTS lsp_parts
 #endif
 
+#ifdef LSP_INSTANCES
+#define LSP_ADDRESSES
+#define LSP_CELLS
+#define LSP_WIDE
+#else
 layout(std430, set = LSP_SET, binding = LSP_FIRST_BINDING + LSP_BINDING_HEADER) readonly buffer LspHeaderBuffer {
   LspHeader lsp_header;
 };
+#endif
 
 /* Arrays are read 16 bytes at a time, which is faster than member by member. */
 LspNode lsp_node_of(uvec4 a, uvec4 b, uvec4 c, uvec4 d) {
@@ -106,11 +113,12 @@ LspFilledCell lsp_cell_tree_of(uvec4 w) { return LspFilledCell(0u, 0u, 0u, 0u, 0
 #include "lsp/lsp_addresses.glsl"
 #else
 #include "lsp/lsp_descriptors.glsl"
+#define LSP_HEADER(scene) lsp_header
 #endif
 
 /* What lsp/traverse.h asks for besides. */
-LspHeader lsp_load_header(LspScene scene) { return lsp_header; }
-bool lsp_has_normals(LspScene scene) { return (lsp_header.required_features & LSP_FEATURE_NORMALS) != 0u; }
+LspHeader lsp_load_header(LspScene scene) { return LSP_HEADER(scene); }
+bool lsp_has_normals(LspScene scene) { return (LSP_HEADER(scene).required_features & LSP_FEATURE_NORMALS) != 0u; }
 void lsp_fetch_node(LspScene scene, uint flags, uint i) {}
 vec3 lsp_vec3(vec3 v) { return v; }
 vec3 lsp_float3_of(vec3 v) { return v; }
@@ -118,6 +126,9 @@ vec3 lsp_float3_of(vec3 v) { return v; }
 #define LSP_STEP
 #define LSP_FN_RARE
 
+#ifdef LSP_INSTANCES
+#include "lsp/lsp_instances.glsl"
+#else
 #include "lsp/traverse.h"
 
 /* flags: LSP_TRACE_*; lod: stop at a Line Space once its diagonal is under lod * distance, 0: deepest. */
@@ -134,5 +145,7 @@ bool lsp_occluded(LspScene scene, LspRay ray, uint flags, float lod, uint dial) 
 LspHit lsp_trace(LspScene scene, LspRay ray, uint flags, float lod) {
   return lsp_trace(scene, ray, flags, lod, lsp_load_header(scene).quality[LSP_QUALITY_BALANCED]);
 }
+
+#endif
 
 #endif

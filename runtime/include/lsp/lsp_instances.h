@@ -30,15 +30,17 @@ typedef struct lsp_instance {
 /* Of a hit: the number of the instance, in the order in which they were given. */
 #define LSP_HIT_INSTANCE(hit) ((hit).flags >> LSP_HIT_INSTANCE_SHIFT)
 
-/* What a trace needs of an instance. */
+/* What a trace needs of an instance. Shaders read it as ten times 16 bytes. */
 typedef struct lsp_instance_record {
   lsp_instance instance; /* as given */
   float growth;          /* of boxes, by the distance that a ray comes from: see NUMERICS.md, Instances */
-  double inverse[9];     /* scene to object space, rows, without the translation */
-  double translation[3]; /* where in the scene the point lies that the asset's positions are relative to */
-  float lo[3];           /* box in scene space that holds the asset */
-  float hi[3];           /* its other corner */
-  uint32_t reserved[2];  /* zero */
+  float inverse[9];      /* scene to object space, rows, without the translation */
+  float translation[3];  /* where in the scene the point lies that the asset's positions are relative to */
+  float translation_rest[3]; /* what single precision leaves of it */
+  uint32_t reserved_0;       /* zero */
+  float lo[3];               /* box in scene space that holds the asset */
+  float hi[3];               /* its other corner */
+  uint32_t reserved_1[2];    /* zero */
 } lsp_instance_record;
 
 /* A node of the tree over instances; its children lie side by side. */
@@ -58,14 +60,14 @@ typedef struct lsp_instances {
   uint32_t count;                     /* of instances */
 } lsp_instances;
 
-/* Bytes that lsp_instances_build needs for `count` instances: 260 each. */
+/* Bytes that lsp_instances_build needs for `count` instances: 228 each. */
 LSP_API uint64_t lsp_instances_bytes(uint32_t count);
 
 /* Makes `count` instances of the assets ready for rays, in memory[0, bytes), 16-byte aligned and at least
- * lsp_instances_bytes(count) long. `assets` (asset_count pointers to open scenes, of any base structure, any
- * of them for exact or approximate rays), the scenes and the memory must outlive `out` and stay as they are;
- * `instances` is copied. Object space is the input's of the bake: where a file has an origin of its own
- * (lsp_scene_origin), that is added.
+ * lsp_instances_bytes(count) long: what shaders read as well, see lsp/lsp_vulkan.h. `assets` (asset_count
+ * pointers to open scenes, of any base structure, any of them for exact or approximate rays), the scenes and
+ * the memory must outlive `out` and stay as they are; `instances` is copied. Object space is the input's of
+ * the bake: where a file has an origin of its own (lsp_scene_origin), that is added.
  *
  * LSP_ERROR_INVALID, by the instance's number: a transform that is not finite, that has no inverse (its
  * determinant is under 2^-40 of the product of its columns' lengths) or that puts the asset beyond what a

@@ -240,6 +240,49 @@ LSP_API void lsp_vulkan_record_trace(const lsp_vulkan_functions* functions, VkCo
                                      VkPipeline pipeline, VkPipelineLayout layout, VkDescriptorSet set,
                                      const lsp_vulkan_trace_constants* constants);
 
+/* ---- instances ------------------------------------------------------------------------------------------
+ *
+ * One shader walks the tree over instances (lsp/lsp_instances.h) and traces their assets, any mixture of
+ * cells and of wide nodes alone, through buffer device addresses: the device's bufferDeviceAddress feature
+ * must be on, and every asset be planned with LSP_USE_ADDRESSES_ALWAYS. It reads two buffers: an
+ * lsp_vulkan_asset for every asset, and the memory of lsp_instances_build, as it is, again whenever instances
+ * have moved. An engine's own shader includes lsp.glsl with LSP_INSTANCES defined; the ready one is here.
+ */
+
+/* What the shader reads of an asset: 480 bytes of a storage buffer. */
+typedef struct lsp_vulkan_asset {
+  VkDeviceAddress sections[LSP_VULKAN_ADDRESS_COUNT]; /* as of lsp_vulkan_address_table */
+  uint32_t dial;     /* lsp_dial of the asset: how approximate rays are answered there */
+  uint32_t reserved; /* zero */
+  LspHeader header;  /* the asset's */
+} lsp_vulkan_asset;
+
+/* Fills *asset for a scene planned with addresses; `buffer_addresses` are those of the plan's buffers in its
+ * order. Of `options` the dial is taken, and whether rays are approximate. LSP_ERROR_UNSUPPORTED: the shader
+ * cannot answer such rays of this file, which has a BVH or an NTree, or cells and for exact rays a BVH (files
+ * before 2.3); or the plan is without addresses. */
+LSP_API lsp_status lsp_vulkan_describe_asset(const lsp_scene* scene, const lsp_vulkan_plan* plan,
+                                             const VkDeviceAddress* buffer_addresses,
+                                             const lsp_trace_options* options, lsp_vulkan_asset* asset,
+                                             lsp_error* error);
+
+/* SPIR-V (for Vulkan 1.1) of the trace shader of instances, as of lsp_vulkan_trace_spirv: entry point,
+ * layout, specialization constants and life are the same. Stack and parts are those that any of the assets
+ * needs. */
+LSP_API const uint32_t* lsp_vulkan_instances_spirv(int counting, size_t* bytes);
+
+/* Points `set`, of the trace shader's layout, at the buffers of assets and of instances, and at rays, hits
+ * and counters; the last may be VK_NULL_HANDLE for the shader that does not count. */
+LSP_API void lsp_vulkan_write_instance_descriptors(const lsp_vulkan_functions* functions, VkDevice device,
+                                                   VkDescriptorSet set, VkBuffer assets, VkBuffer instances,
+                                                   VkBuffer rays, VkBuffer hits, VkBuffer counters);
+
+/* Records the dispatch, as lsp_vulkan_record_trace; LSP_HIT_INCOMPLETE means the same, and
+ * lsp_trace_instances traces that ray. */
+LSP_API void lsp_vulkan_record_instances(const lsp_vulkan_functions* functions, VkCommandBuffer commands,
+                                         VkPipeline pipeline, VkPipelineLayout layout, VkDescriptorSet set,
+                                         const lsp_vulkan_instance_constants* constants);
+
 #ifdef __cplusplus
 }
 #endif

@@ -4,8 +4,7 @@
  * lsp.glsl includes this file in shaders, runtime/src/trace_bvh.cpp and its like within a struct, whose
  * members the functions and the stack then are: one text, so that both give the same bits. That holds where
  * the compiler contracts nothing (`precise`, -ffp-contract=off), rounds division and square root correctly,
- * and evaluates what stands here: min and max are written out because their answers to NaN are not the same
- * everywhere.
+ * and evaluates what stands here.
  *
  * The includer has defined LspScene, lsp_load_* and lsp_fetch_* (lsp.glsl, runtime/src/trace_subset.h). There
  * is no include guard: in C++ a file may hold the text in several structs.
@@ -35,6 +34,11 @@
 #include "lsp/interface.h"
 #include "lsp/parts.h"
 
+/* What depends on no base structure; a shader that holds the text of two has it once. */
+#ifndef LSP_TRAVERSE_AGAIN
+#include "lsp/arithmetic.h"
+#endif
+
 #ifndef GL_core_profile
 #define precise
 #endif
@@ -44,6 +48,7 @@
 #define LSP_PARTS 0xFFFFFFFFu
 #endif
 
+#ifndef LSP_TRAVERSE_AGAIN
 /* LSP_TRACE_NEAR_SKIP: a surface this close to the origin, in diagonals of the box, is the one the ray
  * starts on. Wrong answers grow with it (bunny, N = 6, D = 9: 0.01 0.48 %, 0.05 0.49 %, 0.15 0.52 %; Sibenik
  * 1.28 %, 1.63 %, 2.62 %), the triangles tested shrink (0.22, 0.13, 0.09 a ray; 0.52, 0.40, 0.25). */
@@ -54,9 +59,6 @@
 /* Of a Line Space: the ray begins inside its box, and what is to be asked is whether it leaves freely. */
 #define LSP_STACK_NEAR_BIT 0x20000000u
 #define LSP_STACK_INDEX_MASK 0x1FFFFFFFu
-
-#define LSP_INFINITY uintBitsToFloat(0x7F800000u)
-#define LSP_FLOAT_MAX uintBitsToFloat(0x7F7FFFFFu)
 
 /* The work done; where nobody reads it the compiler leaves it out. */
 struct LspCounts {
@@ -129,33 +131,6 @@ LSP_FN LspCounts lsp_no_counts() {
   counts.exact = 0u;
   counts.exact_nodes = 0u;
   return counts;
-}
-
-LSP_FN float lsp_min(float a, float b) { return b < a ? b : a; }
-LSP_FN float lsp_max(float a, float b) { return a < b ? b : a; }
-
-LSP_FN float lsp_dot(vec3 a, vec3 b) {
-  precise float r = a.x * b.x + a.y * b.y + a.z * b.z;
-  return r;
-}
-
-LSP_FN vec3 lsp_cross(vec3 a, vec3 b) {
-  precise vec3 r = vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
-  return r;
-}
-
-LSP_FN bool lsp_is_nan(float x) { return (floatBitsToUint(x) & 0x7FFFFFFFu) > 0x7F800000u; }
-LSP_FN bool lsp_is_finite(float x) { return (floatBitsToUint(x) & 0x7F800000u) != 0x7F800000u; }
-LSP_FN bool lsp_all_finite(vec3 v) { return lsp_is_finite(v.x) && lsp_is_finite(v.y) && lsp_is_finite(v.z); }
-
-/* |d| under 2^-60 of the largest component cannot move a ray by an ulp of the scene: it is taken for zero, or
- * products of it would underflow in the triangle test. Its slab is either hit along its whole length or
- * missed, and a finite reciprocal keeps 0 * infinity out of the arithmetic. */
-LSP_FN float lsp_no_trifle(float d) { return abs(d) < 8.6736174e-19f ? 0.0f : d; }
-
-LSP_FN float lsp_reciprocal(float d) {
-  precise float r = 1.0f / (d == 0.0f ? 1.0f : d);
-  return d == 0.0f ? 1.2089258e24f : r;
 }
 
 /* Rotates the axes so that `axis` comes last; keeps their cyclic order. */
@@ -260,11 +235,6 @@ LSP_FN float lsp_box_exit(LspSetup s, vec3 lo, vec3 hi) {
   precise vec3 a = (lo - s.origin_plus) * s.inverse;
   precise vec3 b = (hi - s.origin_minus) * s.inverse;
   return lsp_min(lsp_min(lsp_max(a.x, b.x), lsp_max(a.y, b.y)), lsp_max(a.z, b.z));
-}
-
-LSP_FN float lsp_largest(vec3 v) {
-  vec3 m = abs(v);
-  return lsp_max(lsp_max(m.x, m.y), m.z);
 }
 
 /* A function that most rays call once or twice: better not inlined into the loop on the CPU. */
@@ -381,6 +351,101 @@ LSP_FN vec2 lsp_plane_weights(LspSetup s, LspTriangle tri, float t) {
   precise vec2 weights = vec2(lsp_dot(lsp_cross(r, e2), n) * scale, lsp_dot(lsp_cross(e1, r), n) * scale);
   return weights;
 }
+
+LSP_FN LspHit lsp_no_hit() {
+  LspHit hit;
+  hit.t = LSP_INFINITY;
+  hit.primitive = LSP_NONE;
+  hit.u = 0.0f;
+  hit.v = 0.0f;
+  hit.normal = lsp_float3_of(vec3(0.0f, 0.0f, 0.0f));
+  hit.flags = 0u;
+  return hit;
+}
+
+/* The answer in the caller's terms: t in lengths of the direction given, unit shading normal. flags: of what is asked,
+ * LSP_TRACE_OCCLUSION counts. `cells`: they were traced. */
+LSP_FN LspHit lsp_finish_as(LspScene scene, LspSetup s, LspRay ray, LspBest best, uint flags, bool cells) {
+  LspHit hit = lsp_no_hit();
+  if (!best.complete) hit.flags = LSP_HIT_INCOMPLETE;
+  if (best.triangle == LSP_NONE) return hit;
+  float t = best.t * s.to_given;
+  if (!(t > ray.tmin && t < ray.tmax)) return hit;
+  if ((flags & LSP_TRACE_OCCLUSION) != 0u) {
+    hit.t = t;
+    return hit;
+  }
+  LspTriangle tri = lsp_load_triangle(scene, best.triangle);
+  vec3 v0 = lsp_vec3(tri.v0);
+  vec3 n = lsp_cross(lsp_vec3(tri.v1) - v0, lsp_vec3(tri.v2) - v0);
+  vec2 weights = vec2(best.u, best.v);
+  if ((best.flags & LSP_HIT_LINE_SPACE) != 0u) weights = lsp_plane_weights(s, tri, best.t);
+  if (lsp_has_normals(scene)) {
+    vec2 at = weights;
+    /* A plane stands for more of the surface here than a candidate does: beyond its triangle extrapolated normals turn
+     * further than the surface. */
+    if (cells) {
+      at.x = lsp_min(lsp_max(at.x, 0.0f), 1.0f);
+      at.y = lsp_min(lsp_max(at.y, 0.0f), 1.0f - at.x);
+    }
+    vec3 smooth_n = lsp_interpolated_normal(scene, best.triangle, at.x, at.y);
+    if (lsp_dot(smooth_n, smooth_n) > 1e-12f) n = smooth_n;
+  }
+  /* A needle may have no area in single precision: then it faces the ray. */
+  if (lsp_largest(n) == 0.0f) n = -s.direction;
+  /* Scaled by a power of two first: the area vector of a small triangle squared would underflow. */
+  uint exponent = floatBitsToUint(lsp_largest(n)) >> 23u;
+  exponent = exponent < 1u ? 1u : (exponent > 253u ? 253u : exponent);
+  n = n * uintBitsToFloat((254u - exponent) << 23u);
+  precise float r = 1.0f / sqrt(lsp_dot(n, n));
+  precise vec3 unit = n * r;
+  hit.t = t;
+  hit.primitive = tri.primitive;
+  hit.u = weights.x;
+  hit.v = weights.y;
+  hit.normal = lsp_float3_of(unit);
+  hit.flags |= best.flags;
+  return hit;
+}
+
+/* As lsp_hit_offset of lsp/lsp.h. */
+LSP_FN float lsp_hit_offset(LspScene scene, LspHit hit) {
+  LspHeader header = lsp_load_header(scene);
+  vec3 extent = lsp_vec3(header.bounds_max) - lsp_vec3(header.bounds_min);
+  float diagonal = sqrt(lsp_dot(extent, extent));
+  if ((hit.flags & LSP_HIT_LINE_SPACE) == 0u) return LSP_OFFSET_EXACT * diagonal;
+  return header.cells.size > 0.0f ? LSP_OFFSET_CELL * header.cells.size : LSP_OFFSET_LINE_SPACE * diagonal;
+}
+
+struct LspTraced {
+  LspHit hit;
+  LspCounts counts;
+  bool valid; /* else the ray is invalid, a miss */
+};
+
+LSP_FN LspTraced lsp_invalid_ray() {
+  LspTraced traced;
+  traced.hit = lsp_no_hit();
+  traced.counts = lsp_no_counts();
+  traced.valid = false;
+  return traced;
+}
+
+LSP_FN LspQuery lsp_query(uint flags, float lod, uint dial) {
+  LspQuery q;
+  q.flags = (flags & LSP_TRACE_OCCLUSION) != 0u ? flags | LSP_TRACE_ANY_HIT : flags;
+  q.lod = lod;
+  q.dial = dial;
+  q.far = false;
+  return q;
+}
+
+/* What a traversal has found, and the work done. */
+struct LspWalked {
+  LspBest best;
+  LspCounts counts;
+};
+#endif
 
 #if !defined(LSP_CELLS) && !defined(LSP_WIDE)
 /* Where the ray passes the box of a Line Space, and which shaft it takes. The shaft is in range for any ray;
@@ -625,87 +690,8 @@ LSP_STEP void lsp_look_up(LspScene scene, LspSetup s, LspQuery q) {
 #include "lsp/cells.h"
 #endif
 
-LSP_FN LspHit lsp_no_hit() {
-  LspHit hit;
-  hit.t = LSP_INFINITY;
-  hit.primitive = LSP_NONE;
-  hit.u = 0.0f;
-  hit.v = 0.0f;
-  hit.normal = lsp_float3_of(vec3(0.0f, 0.0f, 0.0f));
-  hit.flags = 0u;
-  return hit;
-}
-
-/* The answer in the caller's terms: t in lengths of the direction given, unit shading normal. flags: of what is asked,
- * LSP_TRACE_OCCLUSION counts. */
-LSP_FN LspHit lsp_finish(LspScene scene, LspSetup s, LspRay ray, LspBest best, uint flags) {
-  LspHit hit = lsp_no_hit();
-  if (!best.complete) hit.flags = LSP_HIT_INCOMPLETE;
-  if (best.triangle == LSP_NONE) return hit;
-  float t = best.t * s.to_given;
-  if (!(t > ray.tmin && t < ray.tmax)) return hit;
-  if ((flags & LSP_TRACE_OCCLUSION) != 0u) {
-    hit.t = t;
-    return hit;
-  }
-  LspTriangle tri = lsp_load_triangle(scene, best.triangle);
-  vec3 v0 = lsp_vec3(tri.v0);
-  vec3 n = lsp_cross(lsp_vec3(tri.v1) - v0, lsp_vec3(tri.v2) - v0);
-  vec2 weights = vec2(best.u, best.v);
-  if ((best.flags & LSP_HIT_LINE_SPACE) != 0u) weights = lsp_plane_weights(s, tri, best.t);
-  if (lsp_has_normals(scene)) {
-    vec2 at = weights;
-#ifdef LSP_CELLS
-    /* A plane stands for more of the surface here than a candidate does: beyond its triangle extrapolated normals turn
-     * further than the surface. */
-    at.x = lsp_min(lsp_max(at.x, 0.0f), 1.0f);
-    at.y = lsp_min(lsp_max(at.y, 0.0f), 1.0f - at.x);
-#endif
-    vec3 smooth_n = lsp_interpolated_normal(scene, best.triangle, at.x, at.y);
-    if (lsp_dot(smooth_n, smooth_n) > 1e-12f) n = smooth_n;
-  }
-  /* A needle may have no area in single precision: then it faces the ray. */
-  if (lsp_largest(n) == 0.0f) n = -s.direction;
-  /* Scaled by a power of two first: the area vector of a small triangle squared would underflow. */
-  uint exponent = floatBitsToUint(lsp_largest(n)) >> 23u;
-  exponent = exponent < 1u ? 1u : (exponent > 253u ? 253u : exponent);
-  n = n * uintBitsToFloat((254u - exponent) << 23u);
-  precise float r = 1.0f / sqrt(lsp_dot(n, n));
-  precise vec3 unit = n * r;
-  hit.t = t;
-  hit.primitive = tri.primitive;
-  hit.u = weights.x;
-  hit.v = weights.y;
-  hit.normal = lsp_float3_of(unit);
-  hit.flags |= best.flags;
-  return hit;
-}
-
-/* As lsp_hit_offset of lsp/lsp.h. */
-LSP_FN float lsp_hit_offset(LspScene scene, LspHit hit) {
-  LspHeader header = lsp_load_header(scene);
-  vec3 extent = lsp_vec3(header.bounds_max) - lsp_vec3(header.bounds_min);
-  float diagonal = sqrt(lsp_dot(extent, extent));
-  if ((hit.flags & LSP_HIT_LINE_SPACE) == 0u) return LSP_OFFSET_EXACT * diagonal;
-  return header.cells.size > 0.0f ? LSP_OFFSET_CELL * header.cells.size : LSP_OFFSET_LINE_SPACE * diagonal;
-}
-
-struct LspTraced {
-  LspHit hit;
-  LspCounts counts;
-  bool valid; /* else the ray is invalid, a miss */
-};
-
-LSP_FN LspTraced lsp_invalid_ray() {
-  LspTraced traced;
-  traced.hit = lsp_no_hit();
-  traced.counts = lsp_no_counts();
-  traced.valid = false;
-  return traced;
-}
-
-/* Traces a valid ray from the root. */
-LSP_STEP LspTraced lsp_trace_ready(LspScene scene, LspSetup s, LspQuery q, LspRay ray) {
+/* Takes a valid ray from the root to its end. */
+LSP_STEP LspWalked lsp_walk_ready(LspScene scene, LspSetup s, LspQuery q) {
   lsp_begin(scene, s, q);
   bool going = lsp_walk.ref != LSP_NONE;
   while (going) {
@@ -719,9 +705,27 @@ LSP_STEP LspTraced lsp_trace_ready(LspScene scene, LspSetup s, LspQuery q, LspRa
       lsp_walk.ref = LSP_NONE; /* of a damaged file */
     }
   }
+  LspWalked walked;
+  walked.best = lsp_end(scene);
+  walked.counts = lsp_walk.counts;
+  return walked;
+}
+
+#ifndef LSP_TRAVERSE_AGAIN
+LSP_FN LspHit lsp_finish(LspScene scene, LspSetup s, LspRay ray, LspBest best, uint flags) {
+#ifdef LSP_CELLS
+  return lsp_finish_as(scene, s, ray, best, flags, true);
+#else
+  return lsp_finish_as(scene, s, ray, best, flags, false);
+#endif
+}
+
+/* Traces a valid ray. */
+LSP_STEP LspTraced lsp_trace_ready(LspScene scene, LspSetup s, LspQuery q, LspRay ray) {
+  LspWalked walked = lsp_walk_ready(scene, s, q);
   LspTraced traced;
-  traced.hit = lsp_finish(scene, s, ray, lsp_end(scene), q.flags);
-  traced.counts = lsp_walk.counts;
+  traced.hit = lsp_finish(scene, s, ray, walked.best, q.flags);
+  traced.counts = walked.counts;
   traced.valid = true;
   return traced;
 }
@@ -730,13 +734,11 @@ LSP_STEP LspTraced lsp_trace_ready(LspScene scene, LspSetup s, LspQuery q, LspRa
 LSP_STEP LspTraced lsp_trace_ray(LspScene scene, LspRay ray, uint flags, float lod, uint dial) {
   LspSetup s = lsp_setup(scene, ray);
   if (!s.valid) return lsp_invalid_ray();
-  LspQuery q;
-  q.flags = (flags & LSP_TRACE_OCCLUSION) != 0u ? flags | LSP_TRACE_ANY_HIT : flags;
-  q.lod = lod;
-  q.dial = dial;
+  LspQuery q = lsp_query(flags, lod, dial);
   q.far = lsp_is_far(scene, s);
   return lsp_trace_ready(scene, s, q, ray);
 }
+#endif
 
 #ifndef GL_core_profile
 #undef precise

@@ -36,11 +36,8 @@ struct VulkanTrace {
   double gpu_seconds = 0;     // in the shader, by the device's timestamps; 0 where it has none
   uint64_t retraced = 0;      // rays that the device cut short, traced again on the CPU
   uint64_t batches = 0;       // dispatches
-  uint64_t rounds = 0;        // of trace_instances: times that rays went on to their next instance
   lsp_trace_counts counts{};  // rays and, if asked for, the rest
 };
-
-struct InstanceMemory;
 
 // One device with one scene on it, or several. Not for use by several threads at once. Every function throws
 // lsp::Failure: kUnsupported without a device or a feature of it, kLimit where a limit of the device is in
@@ -60,17 +57,17 @@ class VulkanTracer {
   // they are the buffer, and rays that the device cuts short are traced from them.
   void load(const lsp_scene& scene, uint32_t uses, LoadPath path = LoadPath::kAutomatic);
 
-  // Puts several on it, as the assets of instances: each once, however many instances it has. Failures name
-  // the asset by its number.
+  // Puts several on it, as the assets of instances: each once, however many instances it has. The device
+  // needs buffer addresses (kUnsupported), an asset cells or wide nodes for every use. Failures name the
+  // asset by its number.
   void load(std::span<const lsp_scene* const> assets, uint32_t uses, LoadPath path = LoadPath::kAutomatic);
 
   // Traces `rays` into `hits`, of the same size. Counting uses a second, slower shader.
   VulkanTrace trace(const lsp_trace_options& options, std::span<const LspRay> rays, std::span<LspHit> hits,
                     bool count = false, size_t scene = 0);
 
-  // As lsp_trace_instances, with its bits, of instances whose assets are loaded, in their order. This thread
-  // finds the instances that rays come to and moves rays there; the device traces rays of one asset together.
-  // The instances may be others, or elsewhere, every time.
+  // As lsp_trace_instances, with its bits, of instances whose assets are loaded, in their order; the device
+  // walks the tree over them. The instances may be others, or elsewhere, every time.
   VulkanTrace trace_instances(const lsp_instances& instances, const lsp_trace_options& options, uint32_t mask,
                               std::span<const LspRay> rays, std::span<LspHit> hits, bool count = false);
 
@@ -87,7 +84,6 @@ class VulkanTracer {
  private:
   class Impl;
   std::unique_ptr<Impl> impl_;
-  std::unique_ptr<InstanceMemory> instance_memory_;
 };
 
 }  // namespace lsp

@@ -20,6 +20,7 @@ run() { # run GUIDE INFO: the blocks, or what is wrong with them
 cd "$work/integration"
 cp "$source"/runtime/include/lsp/* "$source"/format-spec/include/lsp/* include/lsp/
 blocks INTEGRATION glsl >ao.comp
+blocks INTEGRATION "glsl instances" >instances.comp
 run INTEGRATION sh
 if command -v spirv-cross >/dev/null; then run INTEGRATION "sh spirv-cross"; else echo "without spirv-cross"; fi
 "$program" room.lsp | tee said
