@@ -8,14 +8,17 @@
 namespace lsp {
 
 bool weigh_tables(Baked& baked) {
-  constexpr Gain kWorth = {1.05, 0.97};  // at least, of both
+  // Balanced has to gain on a device, and where it does not on the CPU, fast has to, by much.
+  constexpr Gain kWorth = {1.05, 0.97, 1.05, 1.5};
   if (double(table_bytes(baked) + kTablePadding) > kTableShare * double(exact_bytes(baked))) {
     leave_out_tables(baked,
                      "of so small a mesh, they would be more than three times its exact data (--base cells "
                      "asks for them)");
     return true;
   }
-  if (baked.gain.vulkan < kWorth.vulkan || baked.gain.cpu < kWorth.cpu) {
+  const Gain& gain = baked.gain;
+  if (gain.vulkan < kWorth.vulkan || gain.fast_vulkan < kWorth.fast_vulkan ||
+      (gain.cpu < kWorth.cpu && gain.fast_cpu < kWorth.fast_cpu)) {
     leave_out_tables(baked,
                      "a ray through them would take as long as an exact one (--base cells asks for them)");
     return true;

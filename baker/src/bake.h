@@ -50,10 +50,11 @@ struct BakeOptions {
       folder;  // where Line Spaces that the limit has no room for go meanwhile; empty: nowhere
 };
 
-// How many times as fast as exact rays those are that cells answer at the quality "balanced", by what they
-// count: an estimate.
+// How many times as fast as exact rays those are that cells answer, at the qualities "balanced" and "fast",
+// by what they count: an estimate.
 struct Gain {
-  double vulkan = 0, cpu = 0;
+  double vulkan = 0, cpu = 0;            // balanced
+  double fast_vulkan = 0, fast_cpu = 0;  // fast
 };
 
 // The sections of a file, and the header but for what the writer knows (sizes, offsets, hashes).

@@ -19,6 +19,7 @@
 #include "lsp/vulkan_device.hpp"
 #include "rays.h"
 #include "surface_rays.h"
+#include "view_rays.h"
 #include "writer.h"
 
 namespace lsp::test {
@@ -186,6 +187,27 @@ TEST(Cells, AnswersLookRight) {
   EXPECT_GT(balls, 1000u);
   EXPECT_LT(color_share, 0.02);
   EXPECT_LT(normal_share, 0.05);
+}
+
+TEST(Cells, ViewsLookAtFrontsFromWithin) {
+  constexpr uint32_t kViews = 12, kSide = 8, kPerPoint = 4;
+  const ViewRays seen = view_rays(baked_room(), kViews, kSide, kPerPoint);
+  ASSERT_EQ(seen.views.size(), kViews);
+  size_t points = 0;
+  for (const View& v : seen.views) {
+    EXPECT_EQ(v.first, points);
+    EXPECT_EQ(v.pixels, kSide * kSide);
+    EXPECT_GE(2 * v.count, v.pixels) << "mostly surfaces";
+    EXPECT_LE(v.count, v.pixels);
+    points += v.count;
+  }
+  ASSERT_EQ(seen.rays.size(), points * kPerPoint);
+  // The walls face the room's inside: from without, where a third of the eyes were tried, nobody sees it.
+  for (const LspRay& r : seen.rays)
+    for (const float x : {r.origin.x, r.origin.y, r.origin.z}) ASSERT_LE(std::fabs(x), 2.5f);
+  const ViewRays again = view_rays(baked_room(), kViews, kSide, kPerPoint);
+  ASSERT_EQ(again.rays.size(), seen.rays.size());
+  EXPECT_EQ(std::memcmp(again.rays.data(), seen.rays.data(), seen.rays.size() * sizeof(LspRay)), 0);
 }
 
 TEST(Cells, AnswersLieInTheInterval) {

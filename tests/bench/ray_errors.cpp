@@ -57,7 +57,7 @@ RayErrors occlusion_errors(std::span<const LspHit> truth, std::span<const LspHit
   RayErrors errors;
   errors.rays = truth.size();
   for (size_t i = 0; i < truth.size(); ++i) {
-    const bool true_hit = truth[i].primitive != LSP_NONE, hit = answers[i].primitive != LSP_NONE;
+    const bool true_hit = std::isfinite(truth[i].t), hit = std::isfinite(answers[i].t);
     errors.true_hits += true_hit;
     errors.both_hit += hit && true_hit;
     errors.wrong_hits += hit && !true_hit;

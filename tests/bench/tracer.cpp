@@ -62,7 +62,7 @@ constexpr const char* kQualityNames[LSP_QUALITY_COUNT] = {"balanced", "fast",
 lsp_trace_options Mode::options() const {
   lsp_trace_options options{};
   if (approximate) options.flags |= LSP_TRACE_APPROXIMATE;
-  if (any) options.flags |= LSP_TRACE_ANY_HIT;
+  if (any) options.flags |= LSP_TRACE_OCCLUSION;  // a yes or no, as rtcOccluded gives it
   if (near_approximate) options.flags |= LSP_TRACE_NEAR_APPROXIMATE;
   if (near_skip) options.flags |= LSP_TRACE_NEAR_SKIP;
   options.lod = lod;
