@@ -77,7 +77,7 @@ template <class Traversal>
 LSP_INLINE inline void trace_singly(const lsp_scene& scene, uint32_t flags, float lod, const LspRay* rays,
                                     LspHit* hits, uint64_t count, lsp_trace_counts* counts) {
   Traversal traversal;
-  flags &= LSP_TRACE_ANY_HIT;
+  flags &= LSP_TRACE_ANY_HIT | LSP_TRACE_OCCLUSION;
   for (uint64_t i = 0; i < count; ++i) {
     const typename Traversal::LspSetup s = set_up<Traversal>(scene, rays[i]);
     if (s.valid && trace_if_far<Traversal>(scene, s, flags, lod, rays[i], hits[i], counts)) continue;

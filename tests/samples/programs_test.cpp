@@ -136,13 +136,19 @@ TEST_F(Programs, InstancesAreRendered) {
       35.0);
   picture("two.json", "--effect ao");
   picture("two.json", "--heat steps --mode approximate");
+  bake_hall();
+  std::ofstream(file("halls.json")) << R"({"lsp_scene": 1, "assets": ["atrium.lsp"], "instances": [)" << here
+                                    << ", " << beside << "]}";
   std::string why;
   for (const std::string mode : {"exact", "approximate"}) {
     if (!VulkanTracer::available(&why)) continue;  // VulkanGivesTheSamePicture says so
-    picture("two.json", "--mode " + mode);
+    picture("halls.json", "--mode " + mode);
     const std::string cpu = read(file("p.pfm"));
-    picture("two.json", "--backend vulkan --mode " + mode);
+    picture("halls.json", "--backend vulkan --mode " + mode);
     EXPECT_EQ(read(file("p.pfm")), cpu) << mode;
+    // No shader of instances walks a BVH.
+    EXPECT_EQ(run("lsp-render " + file("two.json") + " -o " + file("p.pfm") + " --quiet --backend vulkan"),
+              5);
   }
   write("bad.json", "{}");
   EXPECT_EQ(run("lsp-render " + file("bad.json") + " -o " + file("p.pfm") + " --quiet"), 3);
