@@ -8,8 +8,10 @@
 namespace lsp {
 
 bool weigh_tables(Baked& baked) {
-  // Balanced has to gain on a device, and where it does not on the CPU, fast has to, by much.
+  // Balanced has to gain on a device. On the CPU it may lose in large scenes where fast gains much, but small
+  // things stay small.
   constexpr Gain kWorth = {1.05, 0.97, 1.05, 1.5};
+  constexpr uint64_t kSmall = 4000000;  // bytes of exact data
   if (double(table_bytes(baked) + kTablePadding) > kTableShare * double(exact_bytes(baked))) {
     leave_out_tables(baked,
                      "of so small a mesh, they would be more than three times its exact data (--base cells "
@@ -18,7 +20,7 @@ bool weigh_tables(Baked& baked) {
   }
   const Gain& gain = baked.gain;
   if (gain.vulkan < kWorth.vulkan || gain.fast_vulkan < kWorth.fast_vulkan ||
-      (gain.cpu < kWorth.cpu && gain.fast_cpu < kWorth.fast_cpu)) {
+      (gain.cpu < kWorth.cpu && (exact_bytes(baked) < kSmall || gain.fast_cpu < kWorth.fast_cpu))) {
     leave_out_tables(baked,
                      "a ray through them would take as long as an exact one (--base cells asks for them)");
     return true;

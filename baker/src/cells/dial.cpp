@@ -39,10 +39,18 @@ struct Costs {
 // exact traces a ray: most of them within a tenth. Steps through the grid are cheap, exact traces dear.
 constexpr Costs kVulkan = {0.3, 2.7, 3.8, 0.25, 2, 2.8, 1.3, 0};  // lavapipe
 
-// On the CPU exact rays wait for memory, the more there is of it. Fitted likewise.
+// On the CPU exact traces wait for memory, the more there is of it. Fitted likewise, and to thirty smaller
+// meshes.
 Costs cpu_costs(uint64_t exact_bytes) {
-  const double doublings = std::log2(std::max(1.0, double(exact_bytes) * 1e-6));
-  return {0.3, 1.8, 5, 0.5, 1.5, 0.85 + 0.17 * std::min(4.0, doublings), 0.6, 0.5};
+  const double doublings = std::clamp(std::log2(std::max(1.0, double(exact_bytes) * 1e-6)), 0.0, 4.0);
+  return {0.3,
+          1.8,
+          2.5 + 0.6 * doublings,
+          0.3 + 0.05 * doublings,
+          0.9 + 0.15 * doublings,
+          0.85 + 0.17 * doublings,
+          0.6,
+          0.5};
 }
 
 // What a point of the dial errs.
