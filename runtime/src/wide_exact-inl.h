@@ -52,9 +52,10 @@ class ExactTrace {
       // lsp_cell_box: in lanes 0 and 2 those of the children. The others are not read.
       const auto t_in = max_of(max_of(smaller_of(x), smaller_of(y)), max_of(smaller_of(z), first));
       const auto t_out = min_of(min_of(larger_of(x), larger_of(y)), min_of(larger_of(z), last));
-      const uint32_t hit = bits_of_4(hn::And(hn::Le(t_in, t_out), hn::Le(t_in, last)));
+      const uint32_t hit = mask_bits(d4, hn::And(hn::Le(t_in, t_out), hn::Le(t_in, last)));
       const bool in_0 = (hit & 1u) != 0, in_1 = (hit & 4u) != 0;
-      const bool is_0_nearer = in_0 && (!in_1 || (bits_of_4(hn::Le(t_in, hn::Shuffle1032(t_in))) & 1u) != 0);
+      const bool is_0_nearer =
+          in_0 && (!in_1 || (mask_bits(d4, hn::Le(t_in, hn::Shuffle1032(t_in))) & 1u) != 0);
       const uint32_t child_0 = node.children & 0xFFFFu, child_1 = node.children >> 16u;
       const bool both = in_0 && in_1, none = !in_0 && !in_1;
       // Selected without branches, which would be taken as often as not.
@@ -170,11 +171,6 @@ class ExactTrace {
   }
   static HWY_INLINE V4 smaller_of(V4 planes) { return min_of(planes, hn::Shuffle2301(planes)); }
   static HWY_INLINE V4 larger_of(V4 planes) { return max_of(planes, hn::Shuffle2301(planes)); }
-  static HWY_INLINE uint32_t bits_of_4(hn::Mask<D4> mask) {
-    uint8_t bytes[8] = {};
-    hn::StoreMaskBits(D4(), mask, bytes);
-    return bytes[0];
-  }
 
   alignas(16) float corner_[3][4];  // from the origin moved outwards, as lo and hi take it
   alignas(16) float unit_[4];

@@ -127,12 +127,8 @@ class Dial {
   }
 
   // Over all rays, with the header's qualities.
-  Gain gain() {
-    const uint32_t balanced = header_.quality[LSP_QUALITY_BALANCED];
-    const lsp_trace_counts at_balanced = work();
-    header_.quality[LSP_QUALITY_BALANCED] = header_.quality[LSP_QUALITY_FAST];
-    const lsp_trace_counts at_fast = work();
-    header_.quality[LSP_QUALITY_BALANCED] = balanced;
+  Gain gain() const {
+    const lsp_trace_counts at_balanced = work(LSP_QUALITY_BALANCED), at_fast = work(LSP_QUALITY_FAST);
     lsp_trace_counts exact{};
     for (const Rays& set : sets_) lsp_add_counts(&exact, &set.counts);
     if (exact.rays == 0) return {};
@@ -200,13 +196,13 @@ class Dial {
     return sum / kPerPoint;
   }
 
-  // Of all rays, at the header's `balanced`.
-  lsp_trace_counts work() const {
+  // Of all rays.
+  lsp_trace_counts work(uint32_t quality) const {
+    lsp_trace_options options{};
+    options.flags = LSP_TRACE_APPROXIMATE;
+    options.quality = quality;
     lsp_trace_counts counts{};
-    for (const Rays& set : sets_) {
-      const DialError error = measure(set);
-      lsp_add_counts(&counts, &error.counts);
-    }
+    for (const Rays& set : sets_) trace(scene_, options, set.rays, &counts);
     return counts;
   }
 
