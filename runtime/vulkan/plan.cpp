@@ -1,4 +1,8 @@
-// Which buffers a scene needs on a device, and the pieces of their upload. Arithmetic only.
+// Which buffers a scene needs on a device, the pieces of their upload, and what a trace needs of a pipeline.
+// Arithmetic only.
+#include <algorithm>
+#include <cstddef>
+
 #include "../src/error.h"
 #include "lsp/lsp_vulkan.h"
 
@@ -223,6 +227,60 @@ extern "C" lsp_status lsp_vulkan_plan_trace(const lsp_scene* scene, const lsp_vu
   kind->parts = lsp_vulkan_parts(scene);
   if (cells && kind->dial == LSP_DIAL_TABLES) kind->parts &= ~LSP_PART_CELL_EXACT;
   return lsp::succeed(error);
+}
+
+// What kind of trace options ask for of an asset, by the shader of instances.
+static lsp_status plan_asset(const lsp_scene* asset, const lsp_vulkan_plan* plan,
+                             const lsp_trace_options* options, lsp_vulkan_kind* kind, lsp_error* error) {
+  *kind = {};
+  if (plan->addresses == 0)
+    return lsp::fail(error, LSP_ERROR_UNSUPPORTED, 0,
+                     "is planned without addresses; plan it with LSP_USE_ADDRESSES_ALWAYS");
+  const lsp_status status = lsp_vulkan_plan_trace(asset, plan, options, kind, error);
+  if (status != LSP_OK) return status;
+  const uint32_t structure = kind->base_structure;
+  if (structure == LSP_BASE_CELLS || structure == LSP_BASE_WIDE) return LSP_OK;
+  return lsp::fail(error, LSP_ERROR_UNSUPPORTED, 0,
+                   "no shader of instances walks its %s; bake it with --base cells or wide, or trace it on "
+                   "the CPU",
+                   structure == LSP_BASE_NTREE ? "NTree" : "BVH");
+}
+
+extern "C" lsp_status lsp_vulkan_plan_instances(const lsp_scene* const* assets, const lsp_vulkan_plan* plans,
+                                                uint32_t asset_count, const lsp_trace_options* options,
+                                                lsp_vulkan_kind* kind, lsp_error* error) {
+  *kind = {};
+  kind->stack = 1;
+  for (uint32_t i = 0; i < asset_count; ++i) {
+    lsp_vulkan_kind of_asset;
+    lsp_error why;
+    const lsp_status status = plan_asset(assets[i], &plans[i], options, &of_asset, &why);
+    if (status != LSP_OK) {
+      *kind = {};
+      return lsp::fail(error, status, why.offset, "asset %u: %s", i, why.message);
+    }
+    kind->stack = std::max(kind->stack, of_asset.stack);
+    kind->flags |= of_asset.flags;
+    kind->parts |= of_asset.parts;
+  }
+  return lsp::succeed(error);
+}
+
+// As lsp_instances.glsl has it.
+static_assert(sizeof(lsp_vulkan_asset) == 480 && offsetof(lsp_vulkan_asset, header) == 96);
+
+extern "C" lsp_status lsp_vulkan_describe_asset(const lsp_scene* scene, const lsp_vulkan_plan* plan,
+                                                const VkDeviceAddress* buffer_addresses,
+                                                const lsp_trace_options* options, lsp_vulkan_asset* asset,
+                                                lsp_error* error) {
+  *asset = {};
+  lsp_vulkan_kind kind;
+  const lsp_status status = plan_asset(scene, plan, options, &kind, error);
+  if (status != LSP_OK) return status;
+  lsp_vulkan_address_table(plan, buffer_addresses, asset->sections);
+  asset->header = *scene->header;
+  asset->dial = kind.dial;
+  return LSP_OK;
 }
 
 extern "C" int lsp_vulkan_next_copy(const lsp_scene* scene, const lsp_vulkan_plan* plan, uint64_t max_bytes,

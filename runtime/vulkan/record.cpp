@@ -1,84 +1,10 @@
-// Recording into the engine's command buffers, and the trace shader's words.
+// Recording into the engine's command buffers.
 #include <algorithm>
-#include <cstddef>
 
 #include "../src/error.h"
 #include "lsp/lsp_vulkan.h"
 
 namespace {
-
-constexpr uint32_t kBvh[] =
-#include "trace.spv.inc"
-    ;
-constexpr uint32_t kBvhCount[] =
-#include "trace_count.spv.inc"
-    ;
-constexpr uint32_t kBvhAddresses[] =
-#include "trace_addresses.spv.inc"
-    ;
-constexpr uint32_t kBvhAddressesCount[] =
-#include "trace_addresses_count.spv.inc"
-    ;
-constexpr uint32_t kNTree[] =
-#include "trace_ntree.spv.inc"
-    ;
-constexpr uint32_t kNTreeCount[] =
-#include "trace_ntree_count.spv.inc"
-    ;
-constexpr uint32_t kNTreeAddresses[] =
-#include "trace_ntree_addresses.spv.inc"
-    ;
-constexpr uint32_t kNTreeAddressesCount[] =
-#include "trace_ntree_addresses_count.spv.inc"
-    ;
-
-constexpr uint32_t kCells[] =
-#include "trace_cells.spv.inc"
-    ;
-constexpr uint32_t kCellsCount[] =
-#include "trace_cells_count.spv.inc"
-    ;
-constexpr uint32_t kCellsAddresses[] =
-#include "trace_cells_addresses.spv.inc"
-    ;
-constexpr uint32_t kCellsAddressesCount[] =
-#include "trace_cells_addresses_count.spv.inc"
-    ;
-
-constexpr uint32_t kWide[] =
-#include "trace_wide.spv.inc"
-    ;
-constexpr uint32_t kWideCount[] =
-#include "trace_wide_count.spv.inc"
-    ;
-constexpr uint32_t kWideAddresses[] =
-#include "trace_wide_addresses.spv.inc"
-    ;
-constexpr uint32_t kWideAddressesCount[] =
-#include "trace_wide_addresses_count.spv.inc"
-    ;
-
-constexpr uint32_t kInstances[] =
-#include "trace_instances.spv.inc"
-    ;
-constexpr uint32_t kInstancesCount[] =
-#include "trace_instances_count.spv.inc"
-    ;
-
-struct Spirv {
-  const uint32_t* words;
-  size_t bytes;
-};
-// By base structure, addresses, counting.
-constexpr Spirv kShaders[4][2][2] = {
-    {{{kBvh, sizeof kBvh}, {kBvhCount, sizeof kBvhCount}},
-     {{kBvhAddresses, sizeof kBvhAddresses}, {kBvhAddressesCount, sizeof kBvhAddressesCount}}},
-    {{{kNTree, sizeof kNTree}, {kNTreeCount, sizeof kNTreeCount}},
-     {{kNTreeAddresses, sizeof kNTreeAddresses}, {kNTreeAddressesCount, sizeof kNTreeAddressesCount}}},
-    {{{kCells, sizeof kCells}, {kCellsCount, sizeof kCellsCount}},
-     {{kCellsAddresses, sizeof kCellsAddresses}, {kCellsAddressesCount, sizeof kCellsAddressesCount}}},
-    {{{kWide, sizeof kWide}, {kWideCount, sizeof kWideCount}},
-     {{kWideAddresses, sizeof kWideAddresses}, {kWideAddressesCount, sizeof kWideAddressesCount}}}};
 
 template <class Function>
 bool load(VkDevice device, PFN_vkGetDeviceProcAddr get, const char* name, Function* function) {
@@ -152,18 +78,6 @@ extern "C" void lsp_vulkan_record_upload_barrier(const lsp_vulkan_functions* fun
                                   VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, 0, 1, &barrier, 0, nullptr, 0, nullptr);
 }
 
-extern "C" const uint32_t* lsp_vulkan_trace_spirv(const lsp_vulkan_plan* plan, int counting, size_t* bytes) {
-  const uint32_t base = plan->base_structure - LSP_BASE_BVH;
-  const Spirv& shader = kShaders[base < 4 ? base : 0][plan->addresses != 0][counting != 0];
-  *bytes = shader.bytes;
-  return shader.words;
-}
-
-extern "C" const uint32_t* lsp_vulkan_instances_spirv(int counting, size_t* bytes) {
-  *bytes = counting != 0 ? sizeof kInstancesCount : sizeof kInstances;
-  return counting != 0 ? kInstancesCount : kInstances;
-}
-
 extern "C" void lsp_vulkan_address_table(const lsp_vulkan_plan* plan, const VkDeviceAddress* buffer_addresses,
                                          VkDeviceAddress table[LSP_VULKAN_ADDRESS_COUNT]) {
   for (uint32_t i = 0; i < LSP_VULKAN_ADDRESS_COUNT; ++i) table[i] = 0;
@@ -178,30 +92,6 @@ extern "C" void lsp_vulkan_address_table(const lsp_vulkan_plan* plan, const VkDe
 extern "C" void lsp_vulkan_write_address_table(const lsp_vulkan_functions* functions, VkDevice device,
                                                VkDescriptorSet set, VkBuffer table) {
   write_binding(*functions, device, set, LSP_BINDING_NODES, table);
-}
-
-// As lsp_instances.glsl has it.
-static_assert(sizeof(lsp_vulkan_asset) == 480 && offsetof(lsp_vulkan_asset, header) == 96);
-
-extern "C" lsp_status lsp_vulkan_describe_asset(const lsp_scene* scene, const lsp_vulkan_plan* plan,
-                                                const VkDeviceAddress* buffer_addresses,
-                                                const lsp_trace_options* options, lsp_vulkan_asset* asset,
-                                                lsp_error* error) {
-  *asset = {};
-  if (plan->addresses == 0)
-    return lsp::fail(error, LSP_ERROR_UNSUPPORTED, 0,
-                     "is planned without addresses; plan it with LSP_USE_ADDRESSES_ALWAYS");
-  const bool approximate = (options->flags & LSP_TRACE_APPROXIMATE) != 0;
-  const uint32_t structure = approximate ? plan->base_structure : plan->exact_structure;
-  if (structure != LSP_BASE_CELLS && structure != LSP_BASE_WIDE)
-    return lsp::fail(error, LSP_ERROR_UNSUPPORTED, 0,
-                     "no shader of instances walks its %s; bake it with --base cells or wide, or trace it on "
-                     "the CPU",
-                     structure == LSP_BASE_NTREE ? "NTree" : "BVH");
-  lsp_vulkan_address_table(plan, buffer_addresses, asset->sections);
-  asset->header = *scene->header;
-  asset->dial = lsp_dial(scene, options);
-  return lsp::succeed(error);
 }
 
 extern "C" void lsp_vulkan_layout_bindings(VkDescriptorSetLayoutBinding bindings[LSP_BINDING_COUNT]) {

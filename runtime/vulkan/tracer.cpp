@@ -33,15 +33,6 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-// What asks for any hit.
-constexpr uint32_t kAnyHit = LSP_TRACE_ANY_HIT | LSP_TRACE_OCCLUSION;
-
-// The parts of the shader that rays at this dial need of the scene.
-uint32_t parts_of(const lsp_scene& scene, uint32_t dial) {
-  const uint32_t parts = lsp_vulkan_parts(&scene);
-  return dial == LSP_DIAL_TABLES ? parts & ~LSP_PART_CELL_EXACT : parts;
-}
-
 void record_barrier(Device& device, VkCommandBuffer commands, VkPipelineStageFlags from,
                     VkAccessFlags written, VkPipelineStageFlags to, VkAccessFlags read) {
   VkMemoryBarrier barrier{};
@@ -174,6 +165,17 @@ class Shader {
   VkDescriptorPool pool_ = VK_NULL_HANDLE;
 };
 
+// The kind of trace of instances of these assets. Throws Failure(kUnsupported), by the asset's number.
+lsp_vulkan_kind plan_instances(std::span<const lsp_scene* const> scenes,
+                               std::span<const lsp_vulkan_plan> plans, const lsp_trace_options& options) {
+  lsp_vulkan_kind kind;
+  lsp_error error;
+  const lsp_status status = lsp_vulkan_plan_instances(
+      scenes.data(), plans.data(), static_cast<uint32_t>(scenes.size()), &options, &kind, &error);
+  if (status != LSP_OK) throw Failure(static_cast<Exit>(status), "", error.message);
+  return kind;
+}
+
 // The pipelines for the scenes on a device, one for each kind of trace, made when they are first needed.
 // Scenes of one kind share them: the stack is that of the scene that needs the largest.
 class Pipelines {
@@ -287,7 +289,9 @@ class VulkanTracer::Impl {
   bool try_import(const lsp_scene& scene, bool forced);
   void attach(const lsp_scene& scene, SceneBuffers&& buffers, bool imported);
   void try_instances();
-  void check_asset(const Loaded& asset) const;
+  void check_assets(std::span<const lsp_scene* const> scenes) const;
+  lsp_trace_options options_for(uint32_t use) const;
+  lsp_trace_options as_loaded(lsp_trace_options options) const;
   void put_instances(const lsp_instances& instances, const lsp_trace_options& options);
   // Records the dispatch that traces so many rays; its pipeline and set are ready.
   using Record = std::function<void(VkCommandBuffer, uint32_t count)>;
@@ -336,18 +340,26 @@ void VulkanTracer::Impl::unload() noexcept {
   loaded.clear();
 }
 
-// Whether the shader of instances can trace it for every use.
-void VulkanTracer::Impl::check_asset(const Loaded& asset) const {
-  for (const uint32_t use : {LSP_USE_EXACT, LSP_USE_APPROXIMATE}) {
-    if ((uses_ & use) == 0) continue;
-    lsp_trace_options options{};
-    if (use == LSP_USE_APPROXIMATE) options.flags = LSP_TRACE_APPROXIMATE;
-    lsp_vulkan_asset described;
+// Refuses, by its number, an asset that the shader of instances cannot trace for every use.
+void VulkanTracer::Impl::check_assets(std::span<const lsp_scene* const> scenes) const {
+  std::vector<lsp_vulkan_plan> plans(scenes.size());
+  for (size_t i = 0; i < scenes.size(); ++i) {
     lsp_error error;
-    const lsp_status status = lsp_vulkan_describe_asset(
-        &asset.scene, &asset.buffers.plan(), asset.buffers.buffer_addresses(), &options, &described, &error);
-    if (status != LSP_OK) throw Failure(static_cast<Exit>(status), "", error.message);
+    const lsp_status status = lsp_vulkan_plan_buffers(scenes[i], uses_, &device->limits, &plans[i], &error);
+    if (status != LSP_OK)
+      throw Failure(static_cast<Exit>(status), "", "asset " + std::to_string(i) + ": " + error.message);
   }
+  if ((uses_ & LSP_USE_EXACT) != 0) plan_instances(scenes, plans, options_for(LSP_USE_EXACT));
+  if ((uses_ & (LSP_USE_APPROXIMATE | LSP_USE_TABLES)) != 0)
+    plan_instances(scenes, plans, options_for(LSP_USE_APPROXIMATE));
+}
+
+// Rays of one use, such as what is loaded can answer.
+lsp_trace_options VulkanTracer::Impl::options_for(uint32_t use) const {
+  lsp_trace_options options{};
+  if (use != LSP_USE_EXACT) options.flags |= LSP_TRACE_APPROXIMATE;
+  if ((uses_ & LSP_USE_OCCLUSION) != 0) options.flags |= LSP_TRACE_OCCLUSION;
+  return options;
 }
 
 // Adds the scene and traces one ray, so that a device that cannot read it fails here. Of assets that is left
@@ -358,13 +370,19 @@ void VulkanTracer::Impl::attach(const lsp_scene& scene, SceneBuffers&& buffers, 
   try {
     const LspRay ray{scene.header->bounds_min, 0.0f, {1.0f, 1.0f, 1.0f}, 3.402823e38f};
     LspHit hit;
-    const uint32_t flags = ((uses_ & LSP_USE_EXACT) != 0 ? 0u : LSP_TRACE_APPROXIMATE) |
-                           ((uses_ & LSP_USE_OCCLUSION) != 0 ? LSP_TRACE_OCCLUSION : 0u);
-    trace({flags, 0.0f, 0, 0.0f}, {&ray, 1}, {&hit, 1}, false, loaded.size() - 1);
+    trace(options_for(uses_ & LSP_USE_EXACT), {&ray, 1}, {&hit, 1}, false, loaded.size() - 1);
   } catch (...) {
     loaded.pop_back();
     throw;
   }
+}
+
+// The options by which the CPU traces what the device cut short: where tables alone are loaded, by these.
+lsp_trace_options VulkanTracer::Impl::as_loaded(lsp_trace_options options) const {
+  if ((options.flags & LSP_TRACE_APPROXIMATE) == 0 || (uses_ & LSP_USE_APPROXIMATE) != 0) return options;
+  options.flags |= LSP_TRACE_MAX_LOSS;
+  options.max_loss = 100;
+  return options;
 }
 
 // Traces a ray through an instance of every asset.
@@ -379,8 +397,7 @@ void VulkanTracer::Impl::try_instances() {
   const float* corner = instances.view().nodes[0].lo;
   const LspRay ray{{corner[0], corner[1], corner[2]}, 0.0f, {1.0f, 1.0f, 1.0f}, 3.402823e38f};
   LspHit hit;
-  const uint32_t flags = (uses_ & LSP_USE_EXACT) != 0 ? 0 : LSP_TRACE_APPROXIMATE;
-  trace_instances(instances.view(), {flags, 0.0f, 0, 0.0f}, 0xFF, {&ray, 1}, {&hit, 1}, false);
+  trace_instances(instances.view(), options_for(uses_ & LSP_USE_EXACT), 0xFF, {&ray, 1}, {&hit, 1}, false);
 }
 
 bool VulkanTracer::Impl::try_import(const lsp_scene& scene, bool forced) {
@@ -412,6 +429,7 @@ void VulkanTracer::Impl::load_next(const lsp_scene& scene, LoadPath path) {
 
 void VulkanTracer::Impl::load_all(std::span<const lsp_scene* const> scenes, LoadPath path, bool numbered) {
   unload();
+  if (numbered) check_assets(scenes);
   uint32_t stack = 1;
   for (const lsp_scene* scene : scenes) stack = std::max(stack, scene->header->max_stack);
   pipelines_ = std::make_unique<Pipelines>(*device, *shader_, stack);
@@ -420,7 +438,6 @@ void VulkanTracer::Impl::load_all(std::span<const lsp_scene* const> scenes, Load
     name_ = numbered ? "asset " + std::to_string(i) + ": " : "";
     try {
       load_next(*scenes[i], path);
-      if (numbered) check_asset(loaded.back());
     } catch (const DeviceLost&) {
       throw;
     } catch (const Failure& failure) {
@@ -567,11 +584,7 @@ VulkanTrace VulkanTracer::Impl::trace(const lsp_trace_options& options, std::spa
     lsp_vulkan_record_trace(&device->functions, commands, pipeline, shader_->layout, shader_->set,
                             &constants);
   };
-  lsp_trace_options again = options;
-  if (kind.dial == LSP_DIAL_TABLES) {  // perhaps because no more is loaded
-    again.flags |= LSP_TRACE_MAX_LOSS;
-    again.max_loss = 100;
-  }
+  const lsp_trace_options again = as_loaded(options);
   const auto retrace = [&](const LspRay& ray, LspHit& hit, lsp_trace_counts* counts, lsp_error* error) {
     return lsp_trace(&scene.scene, &again, &ray, &hit, 1, counts, error);
   };
@@ -618,29 +631,27 @@ VulkanTrace VulkanTracer::Impl::trace_instances(const lsp_instances& instances,
   if (instances.count > 0 && instances.asset_count != loaded.size())
     throw Failure(Exit::kInternal, "", "the instances' assets are not those that were loaded");
   const auto start = std::chrono::steady_clock::now();
-  const uint32_t needed = (wanted.flags & LSP_TRACE_APPROXIMATE) != 0 ? LSP_USE_APPROXIMATE : LSP_USE_EXACT;
-  if ((uses_ & needed) != needed)
-    throw Failure(Exit::kUnsupported, "", "the scene is not loaded for this kind of trace");
+  std::vector<const lsp_scene*> scenes;
+  std::vector<lsp_vulkan_plan> plans;
+  for (const Loaded& asset : loaded) {
+    scenes.push_back(&asset.scene);
+    plans.push_back(asset.buffers.plan());
+  }
+  const lsp_vulkan_kind kind = plan_instances(scenes, plans, wanted);
   begin_trace(rays, hits);
   put_instances(instances, wanted);
   lsp_vulkan_write_instance_descriptors(&device->functions, device->handle, shader_->set, assets_.handle(),
                                         instances_.handle(), batch_.shader_rays(), batch_.shader_hits(),
                                         counters_.handle());
-  uint32_t flags = wanted.flags & kAnyHit, parts = 0;
-  if ((flags & LSP_TRACE_OCCLUSION) != 0) flags |= LSP_TRACE_ANY_HIT;
-  for (const Loaded& asset : loaded) {
-    parts |= parts_of(asset.scene, lsp_dial(&asset.scene, &wanted));
-    // Wide nodes alone answer every ray exactly: the same pipeline.
-    if (asset.scene.header->base_structure == LSP_BASE_CELLS) flags |= wanted.flags & LSP_TRACE_APPROXIMATE;
-  }
-  const VkPipeline pipeline = pipelines_->get_instances(count, flags, parts);
+  const VkPipeline pipeline = pipelines_->get_instances(count, kind.flags, kind.parts);
   const auto record = [&](VkCommandBuffer commands, uint32_t size) {
     const lsp_vulkan_instance_constants constants{instances.count, 0, size, mask};
     lsp_vulkan_record_instances(&device->functions, commands, pipeline, shader_->layout, shader_->set,
                                 &constants);
   };
+  const lsp_trace_options again = as_loaded(wanted);
   const auto retrace = [&](const LspRay& ray, LspHit& hit, lsp_trace_counts* counts, lsp_error* error) {
-    return lsp_trace_instances(&instances, &wanted, mask, &ray, &hit, 1, counts, error);
+    return lsp_trace_instances(&instances, &again, mask, &ray, &hit, 1, counts, error);
   };
   VulkanTrace result = trace_batches(record, retrace, rays, hits, count);
   result.seconds = seconds_since(start);

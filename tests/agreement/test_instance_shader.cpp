@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstring>
 #include <filesystem>
 #include <iostream>
@@ -13,6 +14,7 @@
 #include "lsp/instances.hpp"
 #include "lsp/scene_file.hpp"
 #include "lsp/vulkan_device.hpp"
+#include "offset_shader.h"
 #include "rays.h"
 #include "writer.h"
 
@@ -153,8 +155,8 @@ TEST_F(InstanceShader, EveryKindOfRay) {
   expect_same_bits(tracer, instances, {kApproximate, 0});
 }
 
-// Where no asset has tables approximate rays are exact; where one has nothing but tables all rays are
-// approximate.
+// Where no asset has tables approximate rays are exact, and what is loaded for them will do for both; where
+// one has nothing but tables all rays are approximate.
 TEST_F(InstanceShader, OneKindOfAsset) {
   for (const lsp_scene* scene : {&assets().soup->scene(), &assets().tables.scene()}) {
     const Instances instances({scene}, places_of(1, 30, 43));
@@ -162,10 +164,63 @@ TEST_F(InstanceShader, OneKindOfAsset) {
     tracer.load(std::vector{scene}, LSP_USE_APPROXIMATE);
     rays_ = hard_rays(triangles_of(*scene), 1000, 9, 2);
     expect_same_bits(tracer, instances, {kApproximate, 0});
+    if (scene == &assets().soup->scene()) {
+      expect_same_bits(tracer, instances, {0, 0});
+      continue;
+    }
     const lsp_trace_options exact{};
     std::vector<LspHit> hits(rays_.size());
     EXPECT_THROW(tracer.trace_instances(instances.view(), exact, 0xFF, rays_, hits), Failure);
   }
+}
+
+// Where tables alone are loaded their dial is that of tables alone, whatever is asked for: what cells need
+// besides is at address 0.
+TEST_F(InstanceShader, TablesAlone) {
+  const std::vector<const lsp_scene*> scenes = {&assets().ball->scene(), &assets().sheet->scene()};
+  const Instances instances(scenes, places_of(2, 30, 47));
+  VulkanTracer tracer;
+  tracer.load(scenes, LSP_USE_TABLES);
+  std::vector<LspHit> expected(rays_.size()), hits(rays_.size());
+  instances.trace({kApproximate, 0, LSP_QUALITY_FAST, 0}, 0xFF, rays_, expected);
+  tracer.trace_instances(instances.view(), {kApproximate, 0, LSP_QUALITY_ACCURATE, 0}, 0xFF, rays_, hits);
+  EXPECT_EQ(memcmp(hits.data(), expected.data(), hits.size() * sizeof(LspHit)), 0);
+  try {
+    tracer.trace_instances(instances.view(), {0, 0}, 0xFF, rays_, hits);
+    ADD_FAILURE() << "there is no tree for exact rays";
+  } catch (const Failure& failure) {
+    EXPECT_EQ(failure.exit(), Exit::kUnsupported);
+    EXPECT_STREQ(failure.what(), "asset 0: is not loaded for exact rays; load it for LSP_USE_EXACT");
+  }
+}
+
+// How far off a hit a bounce begins: of every instance, of hits on triangles and on tables, and of misses.
+TEST_F(InstanceShader, OffsetsOfHits) {
+  const std::vector<const lsp_scene*> scenes = {&assets().ball->scene(), &assets().soup->scene()};
+  std::vector<lsp_instance> places = places_of(2, 30, 53);
+  for (size_t i = 0; i < places.size(); ++i)
+    for (float& t : places[i].transform) t *= 1 + static_cast<float>(i);
+  const Instances instances(scenes, places);
+  std::vector<LspHit> hits;
+  for (const uint32_t flags : {0u, kApproximate}) {
+    std::vector<LspHit> found(rays_.size());
+    instances.trace({flags, 0, LSP_QUALITY_FAST, 0}, 0xFF, rays_, found);
+    hits.insert(hits.end(), found.begin(), found.end());
+  }
+  std::vector<float> offsets;
+  try {
+    offsets = offsets_on_device(instances, hits);
+  } catch (const Failure& failure) {
+    if (failure.exit() != Exit::kUnsupported) throw;
+    GTEST_SKIP() << failure.what();
+  }
+  size_t misses = 0, of_tables = 0, of_triangles = 0;
+  for (size_t i = 0; i < hits.size() && !HasFailure(); ++i) {
+    const float expected = lsp_instance_hit_offset(&instances.view(), &hits[i]);
+    EXPECT_NEAR(offsets[i], expected, 1e-6f * expected) << i;
+    ++(expected == 0 ? misses : (hits[i].flags & LSP_HIT_LINE_SPACE) != 0 ? of_tables : of_triangles);
+  }
+  EXPECT_GT(std::min({misses, of_tables, of_triangles}), 50u);
 }
 
 // Thousands in one place: a vector of rays runs out of lavapipe's budget of loops, which must not go unseen.

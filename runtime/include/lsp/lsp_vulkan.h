@@ -252,23 +252,30 @@ LSP_API void lsp_vulkan_record_trace(const lsp_vulkan_functions* functions, VkCo
 /* What the shader reads of an asset: 480 bytes of a storage buffer. */
 typedef struct lsp_vulkan_asset {
   VkDeviceAddress sections[LSP_VULKAN_ADDRESS_COUNT]; /* as of lsp_vulkan_address_table */
-  uint32_t dial;     /* lsp_dial of the asset: how approximate rays are answered there */
+  uint32_t dial;     /* of the asset: how approximate rays are answered there */
   uint32_t reserved; /* zero */
   LspHeader header;  /* the asset's */
 } lsp_vulkan_asset;
 
+/* What kind of trace `options` ask for of instances of these assets (asset_count of them, with a plan each),
+ * as lsp_vulkan_plan_trace of each: the largest stack, all flags and parts that any of them needs.
+ * base_structure and dial are 0: there is one shader, and each asset's dial is in its lsp_vulkan_asset.
+ * LSP_ERROR_UNSUPPORTED, by the asset's number, as lsp_vulkan_plan_trace and where the shader cannot answer
+ * such rays of a file, which has a BVH or an NTree, or cells and for exact rays a BVH (files before 2.3); or
+ * where a plan is without addresses. */
+LSP_API lsp_status lsp_vulkan_plan_instances(const lsp_scene* const* assets, const lsp_vulkan_plan* plans,
+                                             uint32_t asset_count, const lsp_trace_options* options,
+                                             lsp_vulkan_kind* kind, lsp_error* error);
+
 /* Fills *asset for a scene planned with addresses; `buffer_addresses` are those of the plan's buffers in its
- * order. Of `options` the dial is taken, and whether rays are approximate. LSP_ERROR_UNSUPPORTED: the shader
- * cannot answer such rays of this file, which has a BVH or an NTree, or cells and for exact rays a BVH (files
- * before 2.3); or the plan is without addresses. */
+ * order. Of `options` the dial is taken. Errors are those of lsp_vulkan_plan_instances. */
 LSP_API lsp_status lsp_vulkan_describe_asset(const lsp_scene* scene, const lsp_vulkan_plan* plan,
                                              const VkDeviceAddress* buffer_addresses,
                                              const lsp_trace_options* options, lsp_vulkan_asset* asset,
                                              lsp_error* error);
 
 /* SPIR-V (for Vulkan 1.1) of the trace shader of instances, as of lsp_vulkan_trace_spirv: entry point,
- * layout, specialization constants and life are the same. Stack and parts are those that any of the assets
- * needs. */
+ * layout, specialization constants and life are the same. */
 LSP_API const uint32_t* lsp_vulkan_instances_spirv(int counting, size_t* bytes);
 
 /* Points `set`, of the trace shader's layout, at the buffers of assets and of instances, and at rays, hits
