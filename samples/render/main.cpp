@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "exposure.h"
 #include "heat.h"
 #include "lsp/command_line.h"
 #include "lsp/lsp_vulkan.h"
@@ -47,30 +48,6 @@ Sky parse_sun(const std::string& text) {
   }
   sky.sun_direction = glm::normalize(d);
   return sky;
-}
-
-// Stops; nothing: by the picture.
-std::optional<float> parse_exposure(const Arguments& arguments) {
-  const std::string& text = arguments.exposure;
-  if (text == "auto" || (text.empty() && arguments.camera.empty())) return std::nullopt;
-  if (text.empty()) return 0.0f;
-  float stops = 0;
-  int used = 0;
-  if (std::sscanf(text.c_str(), "%f%n", &stops, &used) != 1 || static_cast<size_t>(used) != text.size() ||
-      !(std::abs(stops) <= 20.0f)) {
-    throw Failure(Exit::kUsage, "", "--exposure '" + text + "' is neither auto nor stops from -20 to 20");
-  }
-  return stops;
-}
-
-// Brings surfaces that are too dark or too bright on average into the range that a display shows well; a
-// picture within it is left alone.
-float chosen_exposure(double surface_luminance) {
-  if (!(surface_luminance > 0)) return 0.0f;
-  constexpr double kDark = 0.15;
-  constexpr double kBright = 0.7;
-  const double wanted = std::clamp(surface_luminance, kDark, kBright);
-  return static_cast<float>(std::clamp(std::log2(wanted / surface_luminance), -8.0, 8.0));
 }
 
 Effect parse_effect(const std::string& name) {
@@ -171,10 +148,8 @@ void print_notes(const Arguments& arguments, const char* program, const RenderSc
   if (arguments.verify_percent > 0 && !approximate) say("--verify does nothing: rays are exact");
   if (arguments.verify_percent > 0 && approximate && !arguments.heat.empty())
     say("--verify does nothing: --heat shows rays as they are");
-  const bool tables = std::ranges::any_of(scene.headers(), [](const LspHeader* header) {
-    return (header->required_features & (LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS)) != 0;
-  });
-  if (approximate && !tables) say("neither Line Spaces nor cells in the file: approximate rays are exact");
+  if (approximate && !scene.has_tables())
+    say("neither Line Spaces nor cells in the file: approximate rays are exact");
 }
 
 double mega(uint64_t rays, double seconds) {
@@ -247,7 +222,7 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
       throw Failure(Exit::kUsage, output, "pictures are written as .png or .pfm; choose one of the two");
     }
   }
-  const std::optional<float> exposure = parse_exposure(arguments);
+  const std::optional<float> exposure = parse_exposure(arguments.exposure, !arguments.camera.empty());
   if (!arguments.camera.empty()) parse_camera(arguments.camera);
   parse_sun(arguments.sun);
 

@@ -48,6 +48,12 @@ const lsp_instances* RenderScene::instances() const {
   return instanced_ == nullptr ? nullptr : &instanced_->instances().view();
 }
 
+bool RenderScene::has_tables() const {
+  return std::ranges::any_of(headers_, [](const LspHeader* header) {
+    return (header->required_features & (LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS)) != 0;
+  });
+}
+
 glm::vec3 RenderScene::lo() const {
   if (instanced_ == nullptr) return to_glm(file_->header().bounds_min);
   if (instance_count() == 0) return glm::vec3(0.0f);

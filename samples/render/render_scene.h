@@ -65,6 +65,8 @@ class RenderScene {
   const lsp_scene* single() const { return file_ ? &file_->scene() : nullptr; }
   // Of every file.
   const std::vector<const LspHeader*>& headers() const { return headers_; }
+  // Whether any file has tables, without which approximate rays are exact.
+  bool has_tables() const;
   // The instances; nullptr: there is one file.
   const lsp_instances* instances() const;
   glm::vec3 lo() const;
@@ -85,10 +87,12 @@ class RenderScene {
   // The point that `ray` hits; `hit` must be a hit of this scene.
   SurfacePoint surface(const LspRay& ray, const LspHit& hit) const;
 
-  // Of a scene of one file, what a device needs for the same: the LspTriangle of each primitive (LSP_NONE: it
-  // was dropped), and at least one material.
-  std::span<const uint32_t> triangles_of_primitives() const { return assets_.front().triangle_of_primitive; }
-  std::span<const LspMaterial> materials() const { return assets_.front().materials; }
+  // Of every file, in the order of headers(), what a device needs for the same: the LspTriangle of each
+  // primitive (LSP_NONE: it was dropped), and at least one material.
+  std::span<const uint32_t> triangles_of_primitives(size_t file) const {
+    return assets_[file].triangle_of_primitive;
+  }
+  std::span<const LspMaterial> materials(size_t file) const { return assets_[file].materials; }
   // The light-emitting triangles, in the order in which sample_emitter looks for them.
   std::vector<EmitterTriangle> emitters() const;
 

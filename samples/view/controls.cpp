@@ -17,7 +17,7 @@ constexpr float kLosses[] = {0.0f, 0.1f, 0.2f, 0.5f, 1.0f, 2.0f, 5.0f, 10.0f, 20
 
 const char* const kControlsHelp =
     "Keys: W A S D fly, Q and E down and up, Shift faster, the wheel changes the speed; drag to look around. "
-    "Left and Right, or dragging the line, move it. 1 2 3: quality fast, balanced, accurate; - and +: a "
+    "Right and Left, or dragging it, move the line. 1 2 3: quality fast, balanced, accurate; - and +: a "
     "smaller or larger max loss; [ and ]: lod. Tab: the next effect, H: heat. , and .: exposure. Escape "
     "ends.";
 

@@ -18,59 +18,140 @@ std::vector<ViewEmitter> emitters_of(const RenderScene& scene) {
 
 }  // namespace
 
-DeviceScene::DeviceScene(Gpu& gpu, const RenderScene& scene) : scene_(*scene.single()) {
-  const VkPhysicalDeviceLimits& device = gpu.properties.limits;
-  const uint64_t largest = device.maxStorageBufferRange;
+DeviceScene::DeviceScene(Gpu& gpu, const RenderScene& scene)
+    : gpu_(gpu), path_(scene.path()), instances_(scene.instances()) {
+  if (instances_ == nullptr) {
+    scenes_.push_back(scene.single());
+  } else {
+    scenes_.assign(instances_->assets, instances_->assets + instances_->asset_count);
+    if (!gpu.has_addresses)
+      throw Failure(Exit::kUnsupported, path_,
+                    "instances need buffer addresses (bufferDeviceAddress), which the device lacks; "
+                    "lsp-render shows them on the CPU");
+  }
+  plan(gpu.properties.limits);
   staging_ = GpuBuffer(gpu, kPiece, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, Memory::kHost);
-
-  // [lsp] Which buffers the file needs, for rays of both kinds.
-  const lsp_vulkan_limits limits{largest, 0, device.maxComputeWorkGroupCount[0], 0};
-  lsp_error error;
-  lsp_status status =
-      lsp_vulkan_plan_buffers(&scene_, LSP_USE_EXACT | LSP_USE_APPROXIMATE, &limits, &plan_, &error);
-  if (status == LSP_OK)
-    status = lsp_vulkan_load_functions(gpu.device, vkGetDeviceProcAddr, &functions_, &error);
-  if (status != LSP_OK) throw Failure(static_cast<Exit>(status), scene.path(), error.message);
-  upload_sections(gpu);
-
-  const auto materials = scene.materials();
-  const auto triangles = scene.triangles_of_primitives();
-  const std::vector<ViewEmitter> emitters = emitters_of(scene);
-  materials_ = upload(gpu, materials.data(), materials.size_bytes(), largest);
-  triangles_ = upload(gpu, triangles.data(), triangles.size_bytes(), largest);
-  emitters_ = upload(gpu, emitters.data(), emitters.size() * sizeof(ViewEmitter), largest);
-  emitter_count_ = static_cast<uint32_t>(emitters.size());
+  for (size_t i = 0; i < scenes_.size(); ++i) sections_.push_back(upload_sections(*scenes_[i], plans_[i]));
+  if (instances_ != nullptr) upload_instances();
+  upload_shading(scene);
   staging_ = GpuBuffer();
 }
 
+// [lsp] Which buffers the files need, for rays of both kinds. What cannot be traced is refused here.
+void DeviceScene::plan(const VkPhysicalDeviceLimits& device) {
+  const uint32_t addresses = instances_ != nullptr ? LSP_USE_ADDRESSES_ALWAYS : 0;
+  const uint32_t uses = LSP_USE_EXACT | LSP_USE_APPROXIMATE | addresses;
+  const lsp_vulkan_limits limits{device.maxStorageBufferRange, 0, device.maxComputeWorkGroupCount[0], 0};
+  lsp_error error;
+  lsp_status status = lsp_vulkan_load_functions(gpu_.device, vkGetDeviceProcAddr, &functions_, &error);
+  if (status != LSP_OK) throw Failure(static_cast<Exit>(status), path_, error.message);
+  for (size_t i = 0; i < scenes_.size(); ++i) {
+    status = lsp_vulkan_plan_buffers(scenes_[i], uses, &limits, &plans_.emplace_back(), &error);
+    const std::string number = instances_ != nullptr ? "asset " + std::to_string(i) + ": " : "";
+    if (status != LSP_OK) throw Failure(static_cast<Exit>(status), path_, number + error.message);
+  }
+  for (const uint32_t flags : {0u, LSP_TRACE_APPROXIMATE}) kind({flags, 0, LSP_QUALITY_BALANCED, 0});
+}
+
+lsp_vulkan_kind DeviceScene::kind(const lsp_trace_options& options) const {
+  lsp_vulkan_kind kind;
+  lsp_error error;
+  const auto count = static_cast<uint32_t>(scenes_.size());
+  const lsp_status status =
+      instances_ != nullptr
+          ? lsp_vulkan_plan_instances(scenes_.data(), plans_.data(), count, &options, &kind, &error)
+          : lsp_vulkan_plan_trace(scenes_[0], plans_.data(), &options, &kind, &error);
+  if (status != LSP_OK) throw Failure(static_cast<Exit>(status), path_, error.message);
+  return kind;
+}
+
 // [lsp] The sections as they lie in the file, straight from the mapping.
-void DeviceScene::upload_sections(Gpu& gpu) {
-  for (uint32_t i = 0; i < plan_.buffer_count; ++i) {
-    sections_.emplace_back(gpu, plan_.buffers[i].bytes, plan_.usage, Memory::kDevice);
-    handles_[i] = sections_.back().handle();
+DeviceScene::Sections DeviceScene::upload_sections(const lsp_scene& scene, const lsp_vulkan_plan& plan) {
+  Sections sections;
+  for (uint32_t i = 0; i < plan.buffer_count; ++i) {
+    sections.buffers.emplace_back(gpu_, plan.buffers[i].bytes, plan.usage, Memory::kDevice);
+    sections.handles.push_back(sections.buffers.back().handle());
   }
   lsp_vulkan_copy piece;
-  for (uint64_t cursor = 0; lsp_vulkan_next_copy(&scene_, &plan_, kPiece, &cursor, &piece) != 0;) {
+  for (uint64_t cursor = 0; lsp_vulkan_next_copy(&scene, &plan, kPiece, &cursor, &piece) != 0;) {
     std::memcpy(staging_.mapped(), piece.source, piece.bytes);
-    gpu.run([&](VkCommandBuffer commands) {
-      lsp_vulkan_record_copy(&functions_, commands, &piece, staging_.handle(), 0, handles_[piece.buffer]);
+    gpu_.run([&](VkCommandBuffer commands) {
+      lsp_vulkan_record_copy(&functions_, commands, &piece, staging_.handle(), 0,
+                             sections.handles[piece.buffer]);
       lsp_vulkan_record_upload_barrier(&functions_, commands);
     });
   }
+  return sections;
 }
 
-GpuBuffer DeviceScene::upload(Gpu& gpu, const void* bytes, uint64_t size, uint64_t largest) {
-  if (size > largest) {
-    throw Failure(
-        Exit::kLimit, "",
-        "has more primitives than a buffer of this device may number; use lsp-render --backend cpu");
+// [lsp] The tree over instances as it was built, and room for what the shader reads of every asset.
+void DeviceScene::upload_instances() {
+  placed_ = upload(instances_->records, lsp_instances_bytes(instances_->count), "instances");
+  assets_ = GpuBuffer(gpu_, scenes_.size() * sizeof(lsp_vulkan_asset), VK_BUFFER_USAGE_STORAGE_BUFFER_BIT,
+                      Memory::kHost);
+}
+
+void DeviceScene::set_dial(const lsp_trace_options& options) {
+  if (instances_ == nullptr) return;
+  auto* const described = static_cast<lsp_vulkan_asset*>(assets_.mapped());
+  for (size_t i = 0; i < scenes_.size(); ++i) {
+    std::vector<VkDeviceAddress> addresses;
+    for (const GpuBuffer& buffer : sections_[i].buffers) addresses.push_back(buffer.address());
+    lsp_error error;
+    const lsp_status status =
+        lsp_vulkan_describe_asset(scenes_[i], &plans_[i], addresses.data(), &options, &described[i], &error);
+    if (status != LSP_OK)
+      throw Failure(static_cast<Exit>(status), path_, "asset " + std::to_string(i) + ": " + error.message);
   }
-  GpuBuffer buffer(gpu, size, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+}
+
+void DeviceScene::write_set(VkDescriptorSet set, VkBuffer unused) const {
+  if (instances_ != nullptr)
+    lsp_vulkan_write_instance_descriptors(&functions_, gpu_.device, set, assets_.handle(), placed_.handle(),
+                                          unused, unused, VK_NULL_HANDLE);
+  else
+    lsp_vulkan_write_descriptors(&functions_, gpu_.device, set, plans_.data(), sections_[0].handles.data(),
+                                 unused, unused, VK_NULL_HANDLE);
+}
+
+// Of all files one behind the other.
+void DeviceScene::upload_shading(const RenderScene& scene) {
+  std::vector<LspMaterial> materials;
+  std::vector<uint32_t> triangles;
+  std::vector<ViewFile> files;
+  for (size_t i = 0; i < scenes_.size(); ++i) {
+    const auto own_triangles = scene.triangles_of_primitives(i);
+    const auto own_materials = scene.materials(i);
+    files.push_back({static_cast<uint32_t>(triangles.size()), static_cast<uint32_t>(own_triangles.size()),
+                     static_cast<uint32_t>(materials.size()), static_cast<uint32_t>(own_materials.size())});
+    triangles.insert(triangles.end(), own_triangles.begin(), own_triangles.end());
+    materials.insert(materials.end(), own_materials.begin(), own_materials.end());
+  }
+  const std::vector<ViewEmitter> emitters = emitters_of(scene);
+  materials_ = upload(materials, "materials");
+  triangles_ = upload(triangles, "primitives");
+  files_ = upload(files, "assets");
+  emitters_ = upload(emitters, "light-emitting triangles");
+  emitter_count_ = static_cast<uint32_t>(emitters.size());
+}
+
+template <class T>
+GpuBuffer DeviceScene::upload(const std::vector<T>& items, const char* what) {
+  return upload(items.data(), items.size() * sizeof(T), what);
+}
+
+GpuBuffer DeviceScene::upload(const void* bytes, uint64_t size, const char* what) {
+  if (size > gpu_.properties.limits.maxStorageBufferRange) {
+    throw Failure(Exit::kLimit, path_,
+                  std::string("has more ") + what +
+                      " than a buffer of this device may hold; use lsp-render --backend cpu");
+  }
+  GpuBuffer buffer(gpu_, size, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
                    Memory::kDevice);
   for (uint64_t done = 0; done < size; done += kPiece) {
     const VkBufferCopy piece{0, done, std::min(kPiece, size - done)};
     std::memcpy(staging_.mapped(), static_cast<const char*>(bytes) + done, piece.size);
-    gpu.run([&](VkCommandBuffer commands) {
+    gpu_.run([&](VkCommandBuffer commands) {
       vkCmdCopyBuffer(commands, staging_.handle(), buffer.handle(), 1, &piece);
       lsp_vulkan_record_upload_barrier(&functions_, commands);
     });

@@ -4,6 +4,7 @@
 #include <GLFW/glfw3.h>
 
 #include <algorithm>
+#include <string_view>
 #include <utility>
 
 namespace lsp::sample {
@@ -30,6 +31,16 @@ int rank(VkPhysicalDeviceType type) {
     default:
       return 3;
   }
+}
+
+bool knows_addresses(VkPhysicalDevice device) {
+  uint32_t count = 0;
+  vkEnumerateDeviceExtensionProperties(device, nullptr, &count, nullptr);
+  std::vector<VkExtensionProperties> known(count);
+  vkEnumerateDeviceExtensionProperties(device, nullptr, &count, known.data());
+  return std::ranges::any_of(known, [](const VkExtensionProperties& extension) {
+    return std::string_view(extension.extensionName) == VK_KHR_BUFFER_DEVICE_ADDRESS_EXTENSION_NAME;
+  });
 }
 
 }  // namespace
@@ -157,12 +168,23 @@ void Gpu::create_device() {
   vkGetPhysicalDeviceFeatures(physical, &available);
   VkPhysicalDeviceFeatures features{};
   features.robustBufferAccess = available.robustBufferAccess;
-  const char* swapchain = VK_KHR_SWAPCHAIN_EXTENSION_NAME;
+  std::vector<const char*> extensions{VK_KHR_SWAPCHAIN_EXTENSION_NAME};
+  auto addresses = vk_make<VkPhysicalDeviceBufferDeviceAddressFeatures>(
+      VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_BUFFER_DEVICE_ADDRESS_FEATURES);
+  if (knows_addresses(physical)) {
+    auto all = vk_make<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2);
+    all.pNext = &addresses;
+    vkGetPhysicalDeviceFeatures2(physical, &all);
+    has_addresses = addresses.bufferDeviceAddress == VK_TRUE;
+    addresses.bufferDeviceAddressCaptureReplay = addresses.bufferDeviceAddressMultiDevice = VK_FALSE;
+  }
+  if (has_addresses) extensions.push_back(VK_KHR_BUFFER_DEVICE_ADDRESS_EXTENSION_NAME);
   auto info = vk_make<VkDeviceCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO);
   info.queueCreateInfoCount = 1;
   info.pQueueCreateInfos = &queue_info;
-  info.enabledExtensionCount = 1;
-  info.ppEnabledExtensionNames = &swapchain;
+  if (has_addresses) info.pNext = &addresses;
+  info.enabledExtensionCount = static_cast<uint32_t>(extensions.size());
+  info.ppEnabledExtensionNames = extensions.data();
   info.pEnabledFeatures = &features;
   vk_check(vkCreateDevice(physical, &info, nullptr, &device), "vkCreateDevice");
   vkGetDeviceQueue(device, family, 0, &queue);
@@ -221,6 +243,9 @@ GpuBuffer::GpuBuffer(Gpu& gpu, VkDeviceSize bytes, VkBufferUsageFlags usage, Mem
                                                                          VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
     auto allocation = vk_make<VkMemoryAllocateInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO);
     allocation.allocationSize = needs.size;
+    auto flags = vk_make<VkMemoryAllocateFlagsInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO);
+    flags.flags = VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT;
+    if ((usage & VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT) != 0) allocation.pNext = &flags;
     allocation.memoryTypeIndex =
         static_cast<uint32_t>(std::max(gpu.memory_type(needs.memoryTypeBits, wanted), 0));
     vk_check(vkAllocateMemory(gpu.device, &allocation, nullptr, &memory_), "vkAllocateMemory");
@@ -245,6 +270,12 @@ GpuBuffer& GpuBuffer::operator=(GpuBuffer&& other) noexcept {
   std::swap(memory_, other.memory_);
   std::swap(mapped_, other.mapped_);
   return *this;
+}
+
+VkDeviceAddress GpuBuffer::address() const {
+  auto info = vk_make<VkBufferDeviceAddressInfo>(VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO);
+  info.buffer = buffer_;
+  return vkGetBufferDeviceAddressKHR(gpu_->device, &info);
 }
 
 void record_barrier(VkCommandBuffer commands, VkPipelineStageFlags from, VkAccessFlags written,

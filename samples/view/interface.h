@@ -13,7 +13,8 @@
 #define VIEW_BINDING_EMITTERS 5   /* ViewEmitter */
 #define VIEW_BINDING_STATISTICS 6 /* ViewStatistics of the exact half, then of the approximate one */
 #define VIEW_BINDING_SHOWN 7      /* uint a pixel of the window, as its images have it */
-#define VIEW_BINDING_COUNT 8
+#define VIEW_BINDING_FILES 8      /* ViewFile: one, or one an asset of instances */
+#define VIEW_BINDING_COUNT 9
 
 /* Pixels are worked on in slices of whole rows, at most so many pixels each: one submission a slice. */
 #define VIEW_SLICE_PIXELS (1u << 17)
@@ -70,7 +71,19 @@ LSP_BEGIN(ViewFrame)
   LSP_FLOAT heat_white; /* steps */
   LSP_UINT blue_first;  /* the window's images are BGRA, not RGBA */
   LSP_UINT z_up;        /* z, not y, points to the sky */
+  LSP_UINT instance_count;
+  LSP_UINT reserved0;
+  LSP_UINT reserved1;
+  LSP_UINT reserved2;
 LSP_END(ViewFrame)
+
+/* Where what belongs to a file begins in the buffers that all of them share. */
+LSP_BEGIN(ViewFile)
+  LSP_UINT first_primitive; /* of VIEW_BINDING_TRIANGLES */
+  LSP_UINT primitives;
+  LSP_UINT first_material; /* of VIEW_BINDING_MATERIALS */
+  LSP_UINT materials;
+LSP_END(ViewFile)
 
 /* A surface that a path has come to. */
 LSP_BEGIN(ViewVertex)
@@ -116,8 +129,8 @@ LSP_BEGIN(ViewRegion)
 LSP_END(ViewRegion)
 
 #ifdef __cplusplus
-static_assert(sizeof(ViewFrame) == 176 && sizeof(ViewVertex) == 64 && sizeof(ViewEmitter) == 64);
-static_assert(sizeof(ViewStatistics) == 16 && sizeof(ViewRegion) == 28);
+static_assert(sizeof(ViewFrame) == 192 && sizeof(ViewVertex) == 64 && sizeof(ViewEmitter) == 64);
+static_assert(sizeof(ViewStatistics) == 16 && sizeof(ViewRegion) == 28 && sizeof(ViewFile) == 16);
 #endif
 
 #endif

@@ -1,4 +1,5 @@
-// lsp-view: flies through an .lsp file, exact light on the left of a line, approximate light on its right.
+// lsp-view: flies through an .lsp file or a scene of instances, exact light on the left of a line,
+// approximate light on its right.
 #include <cstdio>
 #include <iostream>
 #include <memory>
@@ -8,10 +9,13 @@
 #define GLFW_INCLUDE_NONE
 #include "bake_first.h"
 #include "controls.h"
+#include "exposure.h"
 #include "lsp/command_line.h"
+#include "lsp/instanced_scene.hpp"
 #include "lsp/trace_arguments.hpp"
 #include "output_file.h"
 #include "picture.h"
+#include "renderer.h"
 
 #include <GLFW/glfw3.h>
 
@@ -28,9 +32,11 @@ struct Arguments {
   std::string camera;
   std::string up;
   std::string size = "960x540";
+  std::string exposure;
   std::string screenshot;
   uint32_t frames = 0;  // 0: until the window is closed
   bool validation = false;
+  std::optional<float> split;  // nothing: by what the file has
   ViewState state;
 };
 
@@ -64,9 +70,15 @@ class Window {
   GLFWwindow* window_ = nullptr;
 };
 
-std::string dial_name(const lsp_trace_options& options, const LspHeader& header) {
+bool has_cells(const RenderScene& scene) {
+  return std::ranges::any_of(scene.headers(), [](const LspHeader* header) {
+    return (header->required_features & LSP_FEATURE_CELLS) != 0;
+  });
+}
+
+std::string dial_name(const lsp_trace_options& options, const RenderScene& scene) {
   char text[64] = "approximate";
-  if ((header.required_features & LSP_FEATURE_CELLS) == 0) {
+  if (!has_cells(scene)) {
     if (options.lod > 0) std::snprintf(text, sizeof text, "lod %g", static_cast<double>(options.lod));
   } else if ((options.flags & LSP_TRACE_MAX_LOSS) != 0) {
     std::snprintf(text, sizeof text, "max loss %g %%", static_cast<double>(options.max_loss));
@@ -81,14 +93,19 @@ double milliseconds(const ViewReport& report, uint32_t part) {
   return report.samples > 0 ? 1e3 * report.seconds[part] / report.samples : 0;
 }
 
-std::string figures(const ViewReport& report, const ViewState& state, const LspHeader& header) {
+// Of the halves that there are.
+std::string figures(const ViewReport& report, const ViewState& state, const RenderScene& scene) {
   const double exact = report.mrays(VIEW_EXACT), approximate = report.mrays(VIEW_APPROXIMATE);
   char text[256];
-  std::snprintf(text, sizeof text, "%s: exact %.1f ms, %.2f Mrays/s | %s %.1f ms, %.2f Mrays/s",
-                kEffects[state.effect].c_str(), milliseconds(report, VIEW_EXACT), exact,
-                dial_name(state.approximate, header).c_str(), milliseconds(report, VIEW_APPROXIMATE),
-                approximate);
-  std::string line = text;
+  std::string line = kEffects[state.effect];
+  const auto add = [&](const char* before, const std::string& name, uint32_t part) {
+    std::snprintf(text, sizeof text, "%s%s %.1f ms, %.2f Mrays/s", before, name.c_str(),
+                  milliseconds(report, part), report.mrays(part));
+    line += text;
+  };
+  if (state.split > 0) add(": ", "exact", VIEW_EXACT);
+  if (state.split < 1)
+    add(state.split > 0 ? " | " : ": ", dial_name(state.approximate, scene), VIEW_APPROXIMATE);
   if (exact > 0 && approximate > 0) {
     std::snprintf(text, sizeof text, ", %.2fx", approximate / exact);
     line += text;
@@ -99,8 +116,8 @@ std::string figures(const ViewReport& report, const ViewState& state, const LspH
 
 // Keeps the window up until it is closed or has shown so many frames.
 void show(Viewer& viewer, GLFWwindow* window, ViewState& state, const Arguments& arguments,
-          const LspHeader& header, float diagonal) {
-  Controls controls(window, state.camera, diagonal);
+          const RenderScene& scene) {
+  Controls controls(window, state.camera, scene.diagonal());
   double titled = -1.0;
   uint32_t shown = 0;
   while (glfwWindowShouldClose(window) == GLFW_FALSE && (arguments.frames == 0 || shown < arguments.frames)) {
@@ -117,12 +134,12 @@ void show(Viewer& viewer, GLFWwindow* window, ViewState& state, const Arguments&
     if (glfwGetTime() - titled < 0.5 || !done) continue;
     titled = glfwGetTime();
     glfwSetWindowTitle(
-        window, ("lsp-view " + arguments.file + " | " + figures(viewer.report(), state, header)).c_str());
+        window, ("lsp-view " + arguments.file + " | " + figures(viewer.report(), state, scene)).c_str());
   }
 }
 
 void report(const ViewReport& r, const ViewState& state, const Arguments& arguments,
-            const CommonOptions& common, const Gpu& gpu, const LspHeader& header) {
+            const CommonOptions& common, const Gpu& gpu, const RenderScene& scene) {
   const auto half = [&](uint32_t part) {
     return nlohmann::ordered_json{{"rays", r.rays[part]},
                                   {"seconds", r.seconds[part]},
@@ -135,7 +152,8 @@ void report(const ViewReport& r, const ViewState& state, const Arguments& argume
                                         {"device", gpu.properties.deviceName},
                                         {"effect", kEffects[state.effect]},
                                         {"split", state.split},
-                                        {"dial", dial_name(state.approximate, header)},
+                                        {"dial", dial_name(state.approximate, scene)},
+                                        {"exposure", state.exposure},
                                         {"camera", to_string(state.camera)},
                                         {"samples", r.samples},
                                         {"exact", half(VIEW_EXACT)},
@@ -147,7 +165,7 @@ void report(const ViewReport& r, const ViewState& state, const Arguments& argume
               << "\n";
   } else if (!common.quiet) {
     std::printf("%s, %s\n%s\ncamera %s\n", arguments.file.c_str(), gpu.properties.deviceName,
-                figures(r, state, header).c_str(), to_string(state.camera).c_str());
+                figures(r, state, scene).c_str(), to_string(state.camera).c_str());
   }
 }
 
@@ -156,11 +174,37 @@ void say(const CommonOptions& common, const std::string& file, const std::vector
   for (const std::string& note : notes) std::cerr << kProgram << ": " << file << ": " << note << "\n";
 }
 
+// The exposure that lsp-render chooses of a small picture, traced on the CPU.
+float automatic_exposure(const RenderScene& scene, const Sky& sky, const ViewState& state, glm::ivec2 size) {
+  RenderOptions options;
+  options.effect = state.effect == VIEW_DIFFUSE ? Effect::kDiffuse : Effect::kAll;
+  const float scale = std::min(1.0f, 160.0f / static_cast<float>(std::max(size.x, size.y)));
+  options.width = std::max(1, static_cast<int>(scale * static_cast<float>(size.x)));
+  options.height = std::max(1, static_cast<int>(scale * static_cast<float>(size.y)));
+  options.samples = 4;
+  RenderReport report;
+  render(scene, sky, state.camera, options, *make_cpu_tracer(scene, 0), report, {});
+  return chosen_exposure(report.surface_luminance);
+}
+
+// The file, or a mesh once it is baked.
+std::unique_ptr<RenderScene> open_scene(const std::string& file, const CommonOptions& common) {
+  const std::filesystem::path path(file);
+  if (path.extension() == ".lsp" || is_instanced_scene(file)) return std::make_unique<RenderScene>(path);
+  say(common, file, {"is baked first; to keep that: lsp-bake " + file + " -o scene.lsp"});
+  const BakedFile baked(file, common.quiet);
+  return std::make_unique<RenderScene>(baked.path());  // a mapping needs no name
+}
+
+// What the user should know before the window opens.
+void say_notes(const Arguments& arguments, const CommonOptions& common, const RenderScene& scene) {
+  say(common, arguments.file, scene.notes());
+  say(common, arguments.file, unused_arguments(arguments.trace, true, scene.headers()));
+  if (!scene.has_tables())
+    say(common, arguments.file, {"neither Line Spaces nor cells in the file: every ray is exact"});
+}
+
 void run(Arguments& arguments, const CommonOptions& common) {
-  const std::filesystem::path ending = std::filesystem::path(arguments.file).extension();
-  if (ending == ".json")
-    throw Failure(Exit::kUnsupported, arguments.file,
-                  "is a scene of instances, which lsp-render shows; bake one .lsp file");
   if (!arguments.screenshot.empty() && std::filesystem::path(arguments.screenshot).extension() != ".png")
     throw Failure(Exit::kUsage, arguments.screenshot, "screenshots are written as .png; choose such a name");
   if (!arguments.screenshot.empty() && arguments.frames == 0)
@@ -171,20 +215,12 @@ void run(Arguments& arguments, const CommonOptions& common) {
   state.effect = static_cast<uint32_t>(std::ranges::find(kEffects, arguments.effect) - kEffects.begin());
   std::optional<Camera> camera;
   if (!arguments.camera.empty()) camera = parse_camera(arguments.camera);
+  const std::optional<float> exposure = parse_exposure(arguments.exposure, camera.has_value());
 
-  std::optional<BakedFile> baked;
-  if (ending != ".lsp") {
-    say(common, arguments.file,
-        {"is baked first; to keep that: lsp-bake " + arguments.file + " -o scene.lsp"});
-    baked.emplace(arguments.file, common.quiet);
-  }
-  const RenderScene scene(baked ? baked->path() : std::filesystem::path(arguments.file));
-  baked.reset();  // a mapping needs no name
-  const LspHeader& header = *scene.headers().front();
-  say(common, arguments.file, scene.notes());
-  say(common, arguments.file, unused_arguments(arguments.trace, true, header));
-  if ((header.required_features & (LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS)) == 0)
-    say(common, arguments.file, {"neither Line Spaces nor cells in the file: both halves are exact"});
+  const std::unique_ptr<RenderScene> opened = open_scene(arguments.file, common);
+  const RenderScene& scene = *opened;
+  say_notes(arguments, common, scene);
+  state.split = arguments.split.value_or(scene.has_tables() ? 0.0f : 1.0f);
   const float aspect = static_cast<float>(size.x) / static_cast<float>(size.y);
   const glm::vec3 up = !arguments.up.empty() || camera ? named_up(arguments.up) : likely_up(scene);
   if (arguments.up.empty() && up.z > 0)
@@ -198,20 +234,21 @@ void run(Arguments& arguments, const CommonOptions& common) {
     say(common, arguments.file, {"a hall without lights: a lamp hangs in its middle"});
   if (camera) state.camera = *camera;
   state.camera.up = up;
+  state.exposure = exposure ? *exposure : automatic_exposure(scene, sky, state, size);
 
   const Window window(size);
   Gpu gpu(window.handle(), arguments.validation);
   ViewReport shown;
   {
     Viewer viewer(gpu, window.handle(), scene, sky);
-    show(viewer, window.handle(), state, arguments, header, scene.diagonal());
+    show(viewer, window.handle(), state, arguments, scene);
     shown = viewer.report();
     if (!arguments.screenshot.empty()) {
       const Viewer::Screenshot shot = viewer.screenshot();
       write_file(arguments.screenshot, rgba_png(shot.width, shot.height, shot.rgba));
     }
   }
-  report(shown, state, arguments, common, gpu, header);
+  report(shown, state, arguments, common, gpu, scene);
   if (shown.incomplete > 0)
     say(common, arguments.file,
         {std::to_string(shown.incomplete) + " rays were cut short by the device and are dark"});
@@ -226,22 +263,27 @@ int main(int argc, char** argv) {
   using namespace lsp;
   using namespace lsp::sample;
   CLI::App app(
-      std::string("Shows an .lsp file in a window to fly through: left of a line indirect light is exact, "
-                  "right of it approximate.\n") +
+      std::string(
+          "Shows a baked scene in a window to fly through. Indirect light comes from the tables; left of "
+          "a line, which the Right key brings in from the left, it is exact.\n") +
           kControlsHelp,
       kProgram);
   CommonOptions common;
   Arguments a;
   add_common_options(app, kProgram, common);
-  app.add_option("FILE", a.file, "The baked scene, an .lsp file; or a mesh, which is baked first")
+  app.add_option(
+         "FILE", a.file,
+         "The baked scene: an .lsp file, or .json with instances of several; or a mesh, which is baked first")
       ->required();
   app.add_option(
          "--effect", a.effect,
          "What is shown: light (all of it, with one diffuse bounce), diffuse (the bounce alone), ao, or heat "
          "(steps of the bounce's rays: black, red, yellow, from 128 on white) (default light)")
       ->check(CLI::IsMember(kEffects));
-  app.add_option("--split", a.state.split,
-                 "Where the line is, a share of the width: 0 all approximate, 1 all exact (default 0.5)")
+  app.add_option(
+         "--split", a.split,
+         "Where the line is, a share of the width: 0 all approximate, 1 all exact (default 0; 1 where "
+         "the file has no tables)")
       ->check(CLI::Range(0.0f, 1.0f));
   add_trace_arguments(app, a.trace);
   app.add_option("--camera", a.camera,
@@ -254,8 +296,10 @@ int main(int argc, char** argv) {
   app.add_option("--radius", a.state.ao_distance,
                  "Reach of --effect ao in diagonals of the scene (default 0.1)")
       ->check(CLI::Range(1e-6f, 1e6f));
-  app.add_option("--exposure", a.state.exposure, "Stops to brighten the picture by (default 0)")
-      ->check(CLI::Range(-20.0f, 20.0f));
+  app.add_option(
+      "--exposure", a.exposure,
+      "Stops to brighten light by, or auto: what is too dark or too bright at first is brought into "
+      "range, as by lsp-render (default auto, with --camera 0)");
   app.add_option("--frames", a.frames, "Show so many and end (default: until the window is closed)")
       ->check(CLI::Range(1u, 1u << 20));
   app.add_option("--screenshot", a.screenshot, "Write what the window shows after --frames, as .png");
@@ -264,7 +308,8 @@ int main(int argc, char** argv) {
   arrange_help(
       app, "lsp-view room.lsp --quality fast",
       {{"What most people need", {"FILE", "--effect", "--split SHARE", "--quality", "--max-loss PERCENT"}},
-       {"The picture", {"--camera EYE:TARGET:ANGLE", "--size WxH", "--up", "--exposure STOPS", "--radius"}},
+       {"The picture",
+        {"--camera EYE:TARGET:ANGLE", "--size WxH", "--up", "--exposure STOPS|auto", "--radius"}},
        {"Line Spaces", {"--near", "--lod"}},
        {"Without hands", {"--frames", "--screenshot FILE.png", "--validation"}}});
   return run_program(kProgram, app, argc, argv, [&] { run(a, common); });

@@ -4,7 +4,6 @@
 #include <chrono>
 #include <cstring>
 
-#include "lsp/parts.h"
 #include "shader_code.h"
 
 namespace lsp::sample {
@@ -104,12 +103,10 @@ void PathTracer::create_sets() {
 }
 
 void PathTracer::write_sets() {
-  // [lsp] The ready trace shader's rays and hits are not used here: any buffer will do.
-  lsp_vulkan_write_descriptors(&scene_.functions(), gpu_.device, sets_[0], &scene_.plan(), scene_.sections(),
-                               vertices_.handle(), vertices_.handle(), VK_NULL_HANDLE);
+  scene_.write_set(sets_[0], vertices_.handle());
   const VkBuffer buffers[VIEW_BINDING_COUNT] = {frame_.handle(),      sums_.handle(),     vertices_.handle(),
                                                 scene_.materials(),   scene_.triangles(), scene_.emitters(),
-                                                statistics_.handle(), shown_.handle()};
+                                                statistics_.handle(), shown_.handle(),    scene_.files()};
   VkDescriptorBufferInfo infos[VIEW_BINDING_COUNT];
   for (size_t i = 0; i < VIEW_BINDING_COUNT; ++i) infos[i] = {buffers[i], 0, VK_WHOLE_SIZE};
   auto write = vk_make<VkWriteDescriptorSet>(VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET);
@@ -120,8 +117,9 @@ void PathTracer::write_sets() {
   vkUpdateDescriptorSets(gpu_.device, 1, &write, 0, nullptr);
 }
 
-VkPipeline PathTracer::pipeline(Kernel kernel, uint32_t base, uint32_t flags, uint32_t parts) {
-  VkPipeline& pipeline = pipelines_[{kernel, base, flags, parts}];
+VkPipeline PathTracer::pipeline(Kernel kernel, const lsp_vulkan_kind& kind) {
+  const uint32_t base = kind.base_structure;
+  VkPipeline& pipeline = pipelines_[{kernel, base, kind.flags, kind.parts}];
   if (pipeline != VK_NULL_HANDLE) return pipeline;
   made_pipeline_ = true;
   const std::span<const uint32_t> code = kernel == Kernel::kShow     ? show_code()
@@ -134,7 +132,7 @@ VkPipeline PathTracer::pipeline(Kernel kernel, uint32_t base, uint32_t flags, ui
   VkShaderModule module = VK_NULL_HANDLE;
   vk_check(vkCreateShaderModule(gpu_.device, &module_info, nullptr, &module), "vkCreateShaderModule");
   // [lsp] The kind of trace and what the scene needs are compiled in: the rest is compiled away.
-  const uint32_t values[] = {std::max(scene_.scene().header->max_stack, 1u), flags, parts};
+  const uint32_t values[] = {kind.stack, kind.flags, kind.parts};
   const VkSpecializationMapEntry entries[] = {{LSP_VULKAN_STACK_CONSTANT, 0, sizeof(uint32_t)},
                                               {VIEW_CONSTANT_FLAGS, sizeof(uint32_t), sizeof(uint32_t)},
                                               {VIEW_CONSTANT_PARTS, 2 * sizeof(uint32_t), sizeof(uint32_t)}};
@@ -182,26 +180,24 @@ void PathTracer::record_light(VkCommandBuffer commands, const ViewFrame& frame, 
 
 // Indirect light of a half: the ray from what the eye sees, and light on what it meets.
 void PathTracer::record_half(VkCommandBuffer commands, const ViewFrame& frame, const ViewRegion& region,
-                             uint32_t flags) {
-  const bool approximate = (flags & LSP_TRACE_APPROXIMATE) != 0;
-  const uint32_t base = approximate ? scene_.plan().base_structure : scene_.plan().exact_structure;
-  uint32_t parts = lsp_vulkan_parts(&scene_.scene());
-  if (frame.dial == LSP_DIAL_TABLES) parts &= ~LSP_PART_CELL_EXACT;  // of cells the tables alone answer
-  const uint32_t any = flags | LSP_TRACE_ANY_HIT;
-  dispatch(commands, pipeline(Kernel::kGather, base, frame.effect == VIEW_AO ? any : flags, parts), region);
+                             const lsp_trace_options& options) {
+  lsp_trace_options any = options;
+  any.flags |= LSP_TRACE_ANY_HIT;
+  const lsp_vulkan_kind of_gather = scene_.kind(frame.effect == VIEW_AO ? any : options);
+  dispatch(commands, pipeline(Kernel::kGather, of_gather), region);
   if (frame.effect == VIEW_LIGHT || frame.effect == VIEW_DIFFUSE)
-    record_light(commands, frame, region, pipeline(Kernel::kLight, base, any, parts));
+    record_light(commands, frame, region, pipeline(Kernel::kLight, scene_.kind(any)));
 }
 
 void PathTracer::record_slice(VkCommandBuffer commands, const ViewFrame& frame, ViewRegion slice,
-                              uint32_t split, uint32_t flags) {
-  const uint32_t exact = scene_.plan().exact_structure;
-  const uint32_t parts = lsp_vulkan_parts(&scene_.scene());
+                              uint32_t split, const lsp_trace_options& options) {
+  const lsp_trace_options exact{};
+  const lsp_trace_options exact_any{LSP_TRACE_ANY_HIT, 0, 0, 0};
   if (timer_ != VK_NULL_HANDLE) vkCmdResetQueryPool(commands, timer_, 0, kStamps);
   slice.vertex = VIEW_EYE;
-  dispatch(commands, pipeline(Kernel::kEye, exact, 0, parts), slice);
+  dispatch(commands, pipeline(Kernel::kEye, scene_.kind(exact)), slice);
   if (frame.effect == VIEW_LIGHT)
-    record_light(commands, frame, slice, pipeline(Kernel::kLight, exact, LSP_TRACE_ANY_HIT, parts));
+    record_light(commands, frame, slice, pipeline(Kernel::kLight, scene_.kind(exact_any)));
   slice.vertex = VIEW_BOUNCE;
   for (const uint32_t part : {VIEW_EXACT, VIEW_APPROXIMATE}) {
     ViewRegion half = slice;
@@ -209,7 +205,7 @@ void PathTracer::record_slice(VkCommandBuffer commands, const ViewFrame& frame, 
     half.first_column = part == VIEW_EXACT ? 0 : split;
     half.columns = part == VIEW_EXACT ? split : frame.width - split;
     stamp(commands, 2 * part);
-    if (half.columns > 0) record_half(commands, frame, half, part == VIEW_EXACT ? 0 : flags);
+    if (half.columns > 0) record_half(commands, frame, half, part == VIEW_EXACT ? exact : options);
     stamp(commands, 2 * part + 1);
   }
   record_barrier(commands, kCompute, VK_ACCESS_SHADER_WRITE_BIT, VK_PIPELINE_STAGE_HOST_BIT,
@@ -217,13 +213,13 @@ void PathTracer::record_slice(VkCommandBuffer commands, const ViewFrame& frame, 
 }
 
 SliceReport PathTracer::trace(const ViewFrame& frame, uint32_t first, uint32_t rows, uint32_t split,
-                              uint32_t flags) {
+                              const lsp_trace_options& options) {
   const auto start = std::chrono::steady_clock::now();
   std::memcpy(frame_.mapped(), &frame, sizeof frame);
   std::memset(statistics_.mapped(), 0, 2 * sizeof(ViewStatistics));
   made_pipeline_ = false;
   const ViewRegion slice{0, frame.width, first, rows, VIEW_EXACT, VIEW_EYE, VIEW_SKY};
-  gpu_.run([&](VkCommandBuffer commands) { record_slice(commands, frame, slice, split, flags); });
+  gpu_.run([&](VkCommandBuffer commands) { record_slice(commands, frame, slice, split, options); });
   SliceReport report;
   report.compiled = made_pipeline_;
   std::memcpy(report.counts, statistics_.mapped(), sizeof report.counts);
@@ -243,7 +239,7 @@ SliceReport PathTracer::trace(const ViewFrame& frame, uint32_t first, uint32_t r
 void PathTracer::show(const ViewFrame& frame) {
   std::memcpy(frame_.mapped(), &frame, sizeof frame);
   gpu_.run([&](VkCommandBuffer commands) {
-    bind(commands, pipeline(Kernel::kShow, 0, 0, 0));
+    bind(commands, pipeline(Kernel::kShow, {}));
     vkCmdDispatch(commands, (frame.window_width + VIEW_GROUP_EDGE - 1) / VIEW_GROUP_EDGE,
                   (frame.window_height + VIEW_GROUP_EDGE - 1) / VIEW_GROUP_EDGE, 1);
     record_barrier(commands, kCompute, VK_ACCESS_SHADER_WRITE_BIT, VK_PIPELINE_STAGE_TRANSFER_BIT,

@@ -33,9 +33,10 @@ class PathTracer {
   // Makes room for a picture, and a window, of so many pixels; forgets the sums.
   void reserve(uint32_t picture, uint32_t window);
 
-  // Rows [first, first + rows) of the frame's picture; approximate rays with these LSP_TRACE_* flags. Columns
-  // left of `split` are exact.
-  SliceReport trace(const ViewFrame& frame, uint32_t first, uint32_t rows, uint32_t split, uint32_t flags);
+  // Rows [first, first + rows) of the frame's picture. Columns left of `split` are exact, the others as
+  // `options` say.
+  SliceReport trace(const ViewFrame& frame, uint32_t first, uint32_t rows, uint32_t split,
+                    const lsp_trace_options& options);
 
   // The sums as pixels of the window, in shown().
   void show(const ViewFrame& frame);
@@ -47,14 +48,14 @@ class PathTracer {
   void create_sets();
   void write_sets();
   void destroy() noexcept;
-  VkPipeline pipeline(Kernel kernel, uint32_t base, uint32_t flags, uint32_t parts);
+  VkPipeline pipeline(Kernel kernel, const lsp_vulkan_kind& kind);
   void bind(VkCommandBuffer commands, VkPipeline pipeline) const;
   void dispatch(VkCommandBuffer commands, VkPipeline pipeline, const ViewRegion& region) const;
   void record_slice(VkCommandBuffer commands, const ViewFrame& frame, ViewRegion slice, uint32_t split,
-                    uint32_t flags);
+                    const lsp_trace_options& options);
   void record_light(VkCommandBuffer commands, const ViewFrame& frame, ViewRegion region, VkPipeline pipeline);
   void record_half(VkCommandBuffer commands, const ViewFrame& frame, const ViewRegion& region,
-                   uint32_t flags);
+                   const lsp_trace_options& options);
   void stamp(VkCommandBuffer commands, uint32_t query) const;
 
   Gpu& gpu_;

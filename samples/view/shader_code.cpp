@@ -14,6 +14,9 @@ constexpr uint32_t kEyeNtree[] =
 constexpr uint32_t kEyeWide[] =
 #include "view_eye_wide.spv.inc"
     ;
+constexpr uint32_t kEyeInstances[] =
+#include "view_eye_instances.spv.inc"
+    ;
 constexpr uint32_t kGather[] =
 #include "view_gather.spv.inc"
     ;
@@ -25,6 +28,9 @@ constexpr uint32_t kGatherCells[] =
     ;
 constexpr uint32_t kGatherWide[] =
 #include "view_gather_wide.spv.inc"
+    ;
+constexpr uint32_t kGatherInstances[] =
+#include "view_gather_instances.spv.inc"
     ;
 constexpr uint32_t kLight[] =
 #include "view_light.spv.inc"
@@ -38,6 +44,9 @@ constexpr uint32_t kLightCells[] =
 constexpr uint32_t kLightWide[] =
 #include "view_light_wide.spv.inc"
     ;
+constexpr uint32_t kLightInstances[] =
+#include "view_light_instances.spv.inc"
+    ;
 constexpr uint32_t kShow[] =
 #include "view_show.spv.inc"
     ;
@@ -48,6 +57,7 @@ constexpr uint32_t kShow[] =
 std::span<const uint32_t> eye_code(uint32_t base_structure) {
   if (base_structure == LSP_BASE_NTREE) return kEyeNtree;
   if (base_structure == LSP_BASE_WIDE) return kEyeWide;
+  if (base_structure == kInstancesShader) return kEyeInstances;
   return kEye;
 }
 
@@ -55,6 +65,7 @@ std::span<const uint32_t> gather_code(uint32_t base_structure) {
   if (base_structure == LSP_BASE_NTREE) return kGatherNtree;
   if (base_structure == LSP_BASE_CELLS) return kGatherCells;
   if (base_structure == LSP_BASE_WIDE) return kGatherWide;
+  if (base_structure == kInstancesShader) return kGatherInstances;
   return kGather;
 }
 
@@ -62,6 +73,7 @@ std::span<const uint32_t> light_code(uint32_t base_structure) {
   if (base_structure == LSP_BASE_NTREE) return kLightNtree;
   if (base_structure == LSP_BASE_CELLS) return kLightCells;
   if (base_structure == LSP_BASE_WIDE) return kLightWide;
+  if (base_structure == kInstancesShader) return kLightInstances;
   return kLight;
 }
 

@@ -46,14 +46,6 @@ void set_light(ViewFrame& frame, const Sky& sky) {
   frame.lamp_intensity = from_glm(sky.lamp_intensity);
 }
 
-// Flags that have no meaning for the file make no pipelines of their own.
-uint32_t useful_flags(uint32_t flags, const LspHeader& header) {
-  if (header.base_structure == LSP_BASE_WIDE) return 0;  // every ray is answered exactly
-  if ((flags & LSP_TRACE_NEAR_APPROXIMATE) != 0) flags &= ~LSP_TRACE_NEAR_SKIP;
-  const bool cells = (header.required_features & LSP_FEATURE_CELLS) != 0;
-  return flags & (cells ? LSP_TRACE_APPROXIMATE : LSP_TRACE_ALL_FLAGS & ~LSP_TRACE_ANY_HIT);
-}
-
 uint32_t divided(uint32_t size, uint32_t scale) { return (size + scale - 1) / scale; }
 
 }  // namespace
@@ -112,9 +104,9 @@ void Viewer::restart(const ViewState& state, uint32_t scale) {
   frame_.height = divided(extent_.height, scale);
   frame_.emitters = device_scene_.emitter_count();
   frame_.effect = state.effect;
-  const lsp_scene& scene = device_scene_.scene();
-  if ((scene.header->required_features & LSP_FEATURE_CELLS) != 0)
-    frame_.dial = lsp_dial(&scene, &state.approximate);
+  device_scene_.set_dial(state.approximate);
+  frame_.dial = device_scene_.kind(state.approximate).dial;
+  frame_.instance_count = device_scene_.instance_count();
   frame_.lod = state.approximate.lod;
   frame_.ao_reach = state.ao_distance * scene_.diagonal();
   frame_.scale = scale;
@@ -130,13 +122,13 @@ void Viewer::restart(const ViewState& state, uint32_t scale) {
 bool Viewer::trace_sample(const std::function<bool()>& interrupted) {
   const auto start = std::chrono::steady_clock::now();
   frame_.sample_number = report_.samples;
-  const uint32_t flags = useful_flags(state_.approximate.flags, *device_scene_.scene().header);
   const uint32_t most = std::max(VIEW_SLICE_PIXELS / frame_.width, 1u);
   for (uint32_t first = 0; first < frame_.height;) {
     const double wanted = seconds_per_pixel_ > 0 ? kSliceSeconds / (seconds_per_pixel_ * frame_.width) : 16.0;
     const uint32_t rows =
         std::min({static_cast<uint32_t>(std::clamp(wanted, 4.0, 65536.0)), most, frame_.height - first});
-    const SliceReport slice = tracer_.trace(frame_, first, rows, divided(frame_.split, frame_.scale), flags);
+    const SliceReport slice =
+        tracer_.trace(frame_, first, rows, divided(frame_.split, frame_.scale), state_.approximate);
     first += rows;
     for (const ViewStatistics& counts : slice.counts) report_.incomplete += counts.incomplete;
     if (!slice.compiled) {

@@ -1,8 +1,6 @@
 // What the eye sees: one exact ray a pixel. Begins the sample: adds what is seen without further rays.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "../interface.h"
-#define LSP_PARTS_CONSTANT_ID VIEW_CONSTANT_PARTS
 #include "path.glsl"
 
 void main() {
@@ -13,7 +11,7 @@ void main() {
   vec2 on_picture = (2.0 * point - size) / size.y * frame.half_height;
   vec3 direction = normalize(frame.forward + on_picture.x * frame.right - on_picture.y * frame.up);
   LspRay ray = LspRay(frame.eye, 0.0, direction, LSP_INFINITY);
-  LspHit hit = lsp_trace(lsp_bound_scene(), ray, kFlags, 0.0);
+  LspHit hit = trace(ray).hit;
 
   vec3 seen = vec3(0.0);
   Surface s;

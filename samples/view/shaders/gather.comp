@@ -2,8 +2,6 @@
 // last; else it leaves the surface that it meets to light.comp.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "../interface.h"
-#define LSP_PARTS_CONSTANT_ID VIEW_CONSTANT_PARTS
 #include "path.glsl"
 #include "count.glsl"
 
@@ -15,7 +13,7 @@ void gather(Pixel pixel) {
   vec2 u = random(pixel, occlusion ? kOcclusionDirection : kDiffuseDirection);
   vec3 direction = above(from, cosine_direction(from.shading_normal, u));
   LspRay ray = LspRay(from.origin, 0.0, direction, occlusion ? frame.ao_reach : LSP_INFINITY);
-  LspTraced traced = lsp_trace_ray(lsp_bound_scene(), ray, kFlags, frame.lod, frame.dial);
+  LspTraced traced = trace(ray);
   count_ray(traced.hit);
   if ((traced.hit.flags & LSP_HIT_INCOMPLETE) != 0u) return;
   if (frame.effect == VIEW_HEAT) {

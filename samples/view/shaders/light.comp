@@ -1,8 +1,6 @@
 // Light on a surface of a path from the sky, the sun, or an emitter or the lamp: one ray to it.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "../interface.h"
-#define LSP_PARTS_CONSTANT_ID VIEW_CONSTANT_PARTS
 #include "path.glsl"
 #include "count.glsl"
 
@@ -70,7 +68,7 @@ void light(Pixel pixel) {
   vec3 radiance = found.radiance * v.weight;
   if (radiance == vec3(0.0) || dot(found.way, v.geometric_normal) <= 0.0) return;
   LspRay ray = LspRay(v.origin, 0.0, found.way, found.reach);
-  LspHit hit = lsp_trace_ray(lsp_bound_scene(), ray, kFlags, frame.lod, frame.dial).hit;
+  LspHit hit = trace(ray).hit;
   if (bounce) count_ray(hit);
   if (hit.primitive == LSP_NONE && (hit.flags & LSP_HIT_INCOMPLETE) == 0u) add(pixel, radiance);
 }

@@ -1,4 +1,10 @@
 /* What the shaders of paths share: their buffers, random numbers, and what a surface is. */
+#ifdef LSP_INSTANCES
+#extension GL_EXT_buffer_reference : require
+#extension GL_EXT_buffer_reference_uvec2 : require
+#endif
+#include "../interface.h"
+#define LSP_PARTS_CONSTANT_ID VIEW_CONSTANT_PARTS
 #include "lsp/lsp.glsl"
 #include "sampler.glsl"
 
@@ -11,6 +17,7 @@ layout(std430, set = 1, binding = VIEW_BINDING_SUMS) buffer SumBuffer { vec4 sum
 layout(std430, set = 1, binding = VIEW_BINDING_VERTICES) buffer VertexBuffer { ViewVertex vertices[]; };
 layout(std430, set = 1, binding = VIEW_BINDING_MATERIALS) readonly buffer MaterialBuffer { LspMaterial materials[]; };
 layout(std430, set = 1, binding = VIEW_BINDING_TRIANGLES) readonly buffer TriangleBuffer { uint triangle_of[]; };
+layout(std430, set = 1, binding = VIEW_BINDING_FILES) readonly buffer FileBuffer { ViewFile files[]; };
 layout(std430, set = 1, binding = VIEW_BINDING_STATISTICS) buffer StatisticsBuffer { ViewStatistics statistics[2]; };
 
 struct Pixel {
@@ -80,6 +87,38 @@ vec3 sky_radiance(vec3 direction) {
   return frame.sky_brightness * mix(vec3(0.24, 0.22, 0.20), clear + glow, clamp(height * 12.0 + 0.5, 0.0, 1.0));
 }
 
+/* A triangle in scene space. */
+struct Corners {
+  vec3 v0;
+  vec3 e1;
+  vec3 e2;
+};
+
+#ifdef LSP_INSTANCES
+LspTraced trace(LspRay ray) { return lsp_trace_ray_instances(frame.instance_count, ray, 0xFFu, kFlags); }
+
+uint file_of(LspHit hit) { return lsp_instance_words[10u * (hit.flags >> LSP_HIT_INSTANCE_SHIFT)].x; }
+LspScene scene_of(LspHit hit) { return lsp_asset_of(hit.flags >> LSP_HIT_INSTANCE_SHIFT); }
+float offset_of(LspHit hit) { return lsp_instance_hit_offset(hit); }
+
+/* By the instance's transform: an lsp_instance_record has its rows and, apart, where the asset's origin lies. */
+Corners corners_of(LspHit hit, LspTriangle tri) {
+  uint first = 10u * (hit.flags >> LSP_HIT_INSTANCE_SHIFT);
+  mat3 linear = transpose(mat3(uintBitsToFloat(lsp_instance_words[first].yzw),
+                               uintBitsToFloat(lsp_instance_words[first + 1u].yzw),
+                               uintBitsToFloat(lsp_instance_words[first + 2u].yzw)));
+  vec3 origin = uintBitsToFloat(lsp_instance_words[first + 6u].yzw);
+  return Corners(linear * tri.v0 + origin, linear * (tri.v1 - tri.v0), linear * (tri.v2 - tri.v0));
+}
+#else
+LspTraced trace(LspRay ray) { return lsp_trace_ray(lsp_bound_scene(), ray, kFlags, frame.lod, frame.dial); }
+
+uint file_of(LspHit hit) { return 0u; }
+LspScene scene_of(LspHit hit) { return lsp_bound_scene(); }
+float offset_of(LspHit hit) { return lsp_hit_offset(lsp_bound_scene(), hit); }
+Corners corners_of(LspHit hit, LspTriangle tri) { return Corners(tri.v0, tri.v1 - tri.v0, tri.v2 - tri.v0); }
+#endif
+
 struct Surface {
   ViewVertex vertex; /* its weight is the surface's colour */
   vec3 emission;
@@ -87,30 +126,30 @@ struct Surface {
 
 /* The surface that a ray has hit. */
 Surface surface_of(LspRay ray, LspHit hit) {
-  LspScene scene = lsp_bound_scene();
+  ViewFile file = files[file_of(hit)];
   Surface s;
   vec3 position = ray.origin + hit.t * ray.direction;
   vec3 shading = hit.normal;
   vec3 geometric = hit.normal;
-  uint index = hit.primitive < triangle_of.length() ? triangle_of[hit.primitive] : LSP_NONE;
+  uint index = hit.primitive < file.primitives ? triangle_of[file.first_primitive + hit.primitive] : LSP_NONE;
   uint material = 0u;
   if (index != LSP_NONE) {
-    LspTriangle tri = lsp_load_triangle(scene, index);
-    vec3 e1 = tri.v1 - tri.v0, e2 = tri.v2 - tri.v0;
-    vec3 area = cross(e1, e2);
+    LspTriangle tri = lsp_load_triangle(scene_of(hit), index);
+    Corners c = corners_of(hit, tri);
+    vec3 area = cross(c.e1, c.e2);
     float twice = length(area);
     if (twice > 0.0) geometric = area / twice;
     /* Closer to the triangle than the way along the ray. A table's plane is another: there t counts. */
-    if ((hit.flags & LSP_HIT_LINE_SPACE) == 0u) position = tri.v0 + hit.u * e1 + hit.v * e2;
+    if ((hit.flags & LSP_HIT_LINE_SPACE) == 0u) position = c.v0 + hit.u * c.e1 + hit.v * c.e2;
     material = tri.material;
   }
   if (dot(geometric, ray.direction) > 0.0) geometric = -geometric;
   if (dot(geometric, shading) < 0.0) shading = -shading;
-  s.vertex.origin = position + lsp_hit_offset(scene, hit) * geometric;
+  s.vertex.origin = position + offset_of(hit) * geometric;
   s.vertex.alive = 1u;
   s.vertex.geometric_normal = geometric;
   s.vertex.shading_normal = shading;
-  LspMaterial m = materials[material < materials.length() ? material : 0u];
+  LspMaterial m = materials[file.first_material + (material < file.materials ? material : 0u)];
   s.vertex.weight = clamp(m.base_color, 0.0, 1.0); /* metals, too, are seen as diffuse */
   s.emission = m.emission;
   s.vertex.reserved0 = s.vertex.reserved1 = s.vertex.reserved2 = 0u;
