@@ -227,5 +227,37 @@ TEST_F(BenchProgram, PicturesAreOfCells) {
   }
 }
 
+// What is baked by mesh answers as what is baked as one.
+TEST_F(BenchProgram, InstancesAnswerAsOneBake) {
+  const fs::path input = directory_ / "spheres.glb", out = directory_ / "out";
+  ASSERT_EQ(run_process({program_path("lsp-sample-scene").string(), input.string(), "--quiet", "--scene",
+                         "spheres", "--triangles", "8000"})
+                .exit_code,
+            0);
+  const ProcessResult run =
+      bench({input.string(), "-o", out.string(), "--quick", "--json", "--no-vulkan", "--suite", "instances"});
+  ASSERT_EQ(run.exit_code, 0) << run.errors;
+  const Json tables = Json::parse(run.output)["sections"]["instances"]["tables"];
+  ASSERT_EQ(tables["instances_sizes"].size(), 1u);
+  const Json& sizes = tables["instances_sizes"][0];
+  EXPECT_GT(sizes["assets"].get<int>(), 1);
+  EXPECT_GE(sizes["instances"].get<int>(), sizes["assets"].get<int>());
+  for (const char* key : {"instanced_mb", "merged_mb", "embree_instanced_mb", "embree_merged_mb"})
+    EXPECT_GT(sizes[key].get<double>(), 0) << key;
+  const Json& rates = tables["instances"];
+  ASSERT_EQ(rates.size(), 24u) << "four sets of rays, six tracers";
+  for (const Json& row : rates) {
+    const std::string tracer = row["tracer"].get<std::string>();
+    EXPECT_GT(row["mrays"].get<double>(), 0) << row.dump();
+    EXPECT_GT(row["times"].get<double>(), 0) << row.dump();
+    const bool by_tables = tracer.find("balanced") != std::string::npos;
+    EXPECT_LT(row["wrong_percent"].get<double>(), by_tables ? 5 : 0.02) << row.dump();
+  }
+  for (const char* tracer : {"merged, exact", "instances, exact", "merged, balanced", "instances, balanced",
+                             "Embree, merged", "Embree, instances"})
+    EXPECT_EQ(rows_where(rates, "tracer", tracer).size(), 4u) << tracer;
+  EXPECT_TRUE(fs::exists(out / "instances.csv"));
+}
+
 }  // namespace
 }  // namespace lsp::bench
