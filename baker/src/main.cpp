@@ -91,19 +91,19 @@ int main(int argc, char** argv) {
   app.add_option("--branching", a.branching, "NTree: cells along an edge of a node; 0: as --resolution")
       ->check(CLI::IsMember({0}) | CLI::Range(2u, LSP_MAX_BRANCHING));
   app.add_option("--levels", a.levels, "NTree: levels of nodes")->check(CLI::Range(1u, LSP_MAX_NTREE_DEPTH));
-  app.add_option(
-         "--preset", a.preset,
-         "Fast to bake and to trace, or accurate; --resolution, --depth and --samples overrule it. Of cells: "
-         "the time of the bake against the exact work that their qualities need")
+  app.add_option("--preset", a.preset,
+                 "Fast to bake, or accurate: tables that take longer to fill, and leave less to be traced "
+                 "exactly. Of Line "
+                 "Spaces --resolution, --depth and --samples overrule it")
       ->check(CLI::IsMember({"fast", "balanced", "accurate"}));
-  app.add_option("--max-error", a.max_error,
-                 "Choose the cheapest setting with at most this many per cent of rays answered wrongly, of "
-                 "cells the point of the dial; 0: as --preset says")
+  app.add_option(
+         "--max-error", a.max_error,
+         "Rays answered wrongly at most, in per cent: the cheapest setting that keeps to it, of cells the "
+         "point of the dial that balanced is; 0: as --preset says")
       ->check(CLI::Range(0.0, 100.0));
   app.add_option("--max-size", a.max_size,
-                 "The longest file, as 20MB: where it would be longer, a coarser grid of cells; 0: any. With "
-                 "--instances "
-                 "of each asset")
+                 "The largest file, as 20MB: where it would be larger, a coarser grid of cells; 0: any. With "
+                 "--instances of each asset")
       ->transform(CLI::AsSizeValue(true));
   auto* resolution =
       app.add_option("--resolution", a.resolution, "N: patches along an edge of a Line Space's box")

@@ -18,6 +18,7 @@ using format::is_ntree;
 using format::Kind;
 using format::kKinds;
 
+constexpr uint32_t kPartMagic = 0x54524150u;  // "PART": what lsp-bake --shard writes, in place of LSP_MAGIC_1
 constexpr uint64_t kPackedAlignment = 256;
 constexpr uint32_t kMaxAlignment = 65536;
 constexpr uint64_t kStepsSlack = 16;
@@ -29,6 +30,9 @@ bool finite(const lsp_float3& v) { return std::isfinite(v.x) && std::isfinite(v.
 
 // Identification: is this a file that this version can read at all?
 lsp_status check_identity(const LspHeader& header, lsp_error* error) {
+  if (header.magic_0 == LSP_MAGIC_0 && header.magic_1 == kPartMagic)
+    return fail(error, LSP_ERROR_INVALID, 0,
+                "is a part of a bake; lsp-merge makes an .lsp file of all parts");
   if (header.magic_0 != LSP_MAGIC_0 || header.magic_1 != LSP_MAGIC_1) {
     return fail(error, LSP_ERROR_INVALID, 0, "is not an .lsp file (its first eight bytes are others)");
   }

@@ -70,7 +70,7 @@ for file in "$root"/usr/bin/* $(find "$root/usr/lib" -name '*.so.*' -type f); do
 done
 if has lsp-tools; then
   manuals=$(grep -c 'LSP_HELP2MAN:FILEPATH=/' "$build/CMakeCache.txt" || true)
-  for name in bake merge validate info trace render compare; do
+  for name in bake merge validate info trace render compare sample-scene; do
     program=$root/usr/bin/lsp-$name
     "$program" --version >/dev/null || fail "$program does not start"
     "$program" --help >help.txt

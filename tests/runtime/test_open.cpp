@@ -97,6 +97,7 @@ const Fault kFaults[] = {
     {"extended", [](Bytes& b) { b.resize(b.size() + 4096); }, LSP_ERROR_INVALID, "extended"},
     {"magic", [](Bytes& b) { b[0] ^= 1; }, LSP_ERROR_INVALID, "not an .lsp file"},
     {"magic tail", [](Bytes& b) { b[7] ^= 1; }, LSP_ERROR_INVALID, "not an .lsp file"},
+    {"part of a bake", [](Bytes& b) { std::memcpy(&b[4], "PART", 4); }, LSP_ERROR_INVALID, "lsp-merge makes"},
     {"major version", [](Bytes& b) { header_of(b).version_major = 3; }, LSP_ERROR_UNSUPPORTED, "version 3.0"},
     {"required feature", [](Bytes& b) { header_of(b).required_features |= 0x40000000; },
      LSP_ERROR_UNSUPPORTED, "0x40000000"},
