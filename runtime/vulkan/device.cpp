@@ -8,7 +8,8 @@
 namespace lsp {
 namespace {
 
-constexpr uint32_t kApiVersion = VK_API_VERSION_1_1;
+constexpr uint32_t kApiVersion = VK_API_VERSION_1_1;           // that is needed
+constexpr uint32_t kAddressesApiVersion = VK_API_VERSION_1_2;  // for buffer addresses
 constexpr const char* kValidationLayer = "VK_LAYER_KHRONOS_validation";
 
 VkResult initialize_loader() {
@@ -84,7 +85,7 @@ VkApplicationInfo application_info() {
   VkApplicationInfo info{};
   info.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO;
   info.pApplicationName = "lsp";
-  info.apiVersion = kApiVersion;
+  info.apiVersion = kAddressesApiVersion;
   return info;
 }
 
@@ -245,19 +246,17 @@ void Device::create_device(const VulkanOptions& options) {
   features.robustBufferAccess = available.robustBufferAccess;
   std::vector<const char*> extensions;
   if (imports) extensions.push_back(VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME);
-  VkPhysicalDeviceBufferDeviceAddressFeaturesKHR addresses{};
-  addresses.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_BUFFER_DEVICE_ADDRESS_FEATURES_KHR;
-  if (has_extension(physical, VK_KHR_BUFFER_DEVICE_ADDRESS_EXTENSION_NAME)) {
+  VkPhysicalDeviceBufferDeviceAddressFeatures addresses{};
+  addresses.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_BUFFER_DEVICE_ADDRESS_FEATURES;
+  if (properties.apiVersion >= kAddressesApiVersion) {
     VkPhysicalDeviceFeatures2 all{};
     all.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
     all.pNext = &addresses;
     vkGetPhysicalDeviceFeatures2(physical, &all);
     addresses.bufferDeviceAddressCaptureReplay = VK_FALSE;
     addresses.bufferDeviceAddressMultiDevice = VK_FALSE;
-    if (addresses.bufferDeviceAddress == VK_TRUE) {
-      extensions.push_back(VK_KHR_BUFFER_DEVICE_ADDRESS_EXTENSION_NAME);
+    if (addresses.bufferDeviceAddress == VK_TRUE)
       address_uses = options.addresses ? LSP_USE_ADDRESSES_ALWAYS : LSP_USE_ADDRESSES_IF_NEEDED;
-    }
   }
   if (options.addresses && address_uses == 0) {
     unsupported("the device has no buffer addresses");

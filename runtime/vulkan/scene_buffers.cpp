@@ -233,7 +233,7 @@ void SceneBuffers::write_addresses() {
     VkBufferDeviceAddressInfo info{};
     info.sType = VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO;
     info.buffer = handles_[i];
-    buffer_addresses_[i] = device_->vk.vkGetBufferDeviceAddressKHR(device_->handle, &info);
+    buffer_addresses_[i] = device_->vk.vkGetBufferDeviceAddress(device_->handle, &info);
   }
   VkDeviceAddress table[LSP_VULKAN_ADDRESS_COUNT];
   lsp_vulkan_address_table(&plan_, buffer_addresses_, table);

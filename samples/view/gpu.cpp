@@ -4,7 +4,6 @@
 #include <GLFW/glfw3.h>
 
 #include <algorithm>
-#include <string_view>
 #include <utility>
 
 namespace lsp::sample {
@@ -31,16 +30,6 @@ int rank(VkPhysicalDeviceType type) {
     default:
       return 3;
   }
-}
-
-bool knows_addresses(VkPhysicalDevice device) {
-  uint32_t count = 0;
-  vkEnumerateDeviceExtensionProperties(device, nullptr, &count, nullptr);
-  std::vector<VkExtensionProperties> known(count);
-  vkEnumerateDeviceExtensionProperties(device, nullptr, &count, known.data());
-  return std::ranges::any_of(known, [](const VkExtensionProperties& extension) {
-    return std::string_view(extension.extensionName) == VK_KHR_BUFFER_DEVICE_ADDRESS_EXTENSION_NAME;
-  });
 }
 
 }  // namespace
@@ -88,7 +77,7 @@ void Gpu::create_instance(bool validation) {
 
   auto application = vk_make<VkApplicationInfo>(VK_STRUCTURE_TYPE_APPLICATION_INFO);
   application.pApplicationName = "lsp-view";
-  application.apiVersion = VK_API_VERSION_1_1;
+  application.apiVersion = VK_API_VERSION_1_2;  // of which buffer addresses are used, where there are any
   const VkValidationFeatureEnableEXT enabled = VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT;
   auto features = vk_make<VkValidationFeaturesEXT>(VK_STRUCTURE_TYPE_VALIDATION_FEATURES_EXT);
   features.enabledValidationFeatureCount = 1;
@@ -168,23 +157,22 @@ void Gpu::create_device() {
   vkGetPhysicalDeviceFeatures(physical, &available);
   VkPhysicalDeviceFeatures features{};
   features.robustBufferAccess = available.robustBufferAccess;
-  std::vector<const char*> extensions{VK_KHR_SWAPCHAIN_EXTENSION_NAME};
+  const char* swapchain = VK_KHR_SWAPCHAIN_EXTENSION_NAME;
   auto addresses = vk_make<VkPhysicalDeviceBufferDeviceAddressFeatures>(
       VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_BUFFER_DEVICE_ADDRESS_FEATURES);
-  if (knows_addresses(physical)) {
+  if (properties.apiVersion >= VK_API_VERSION_1_2) {
     auto all = vk_make<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2);
     all.pNext = &addresses;
     vkGetPhysicalDeviceFeatures2(physical, &all);
     has_addresses = addresses.bufferDeviceAddress == VK_TRUE;
     addresses.bufferDeviceAddressCaptureReplay = addresses.bufferDeviceAddressMultiDevice = VK_FALSE;
   }
-  if (has_addresses) extensions.push_back(VK_KHR_BUFFER_DEVICE_ADDRESS_EXTENSION_NAME);
   auto info = vk_make<VkDeviceCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO);
   info.queueCreateInfoCount = 1;
   info.pQueueCreateInfos = &queue_info;
   if (has_addresses) info.pNext = &addresses;
-  info.enabledExtensionCount = static_cast<uint32_t>(extensions.size());
-  info.ppEnabledExtensionNames = extensions.data();
+  info.enabledExtensionCount = 1;
+  info.ppEnabledExtensionNames = &swapchain;
   info.pEnabledFeatures = &features;
   vk_check(vkCreateDevice(physical, &info, nullptr, &device), "vkCreateDevice");
   vkGetDeviceQueue(device, family, 0, &queue);
@@ -275,7 +263,7 @@ GpuBuffer& GpuBuffer::operator=(GpuBuffer&& other) noexcept {
 VkDeviceAddress GpuBuffer::address() const {
   auto info = vk_make<VkBufferDeviceAddressInfo>(VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO);
   info.buffer = buffer_;
-  return vkGetBufferDeviceAddressKHR(gpu_->device, &info);
+  return vkGetBufferDeviceAddress(gpu_->device, &info);
 }
 
 void record_barrier(VkCommandBuffer commands, VkPipelineStageFlags from, VkAccessFlags written,

@@ -4,7 +4,6 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_buffer_reference : require
 #extension GL_EXT_buffer_reference_uvec2 : require
-#define LSP_INSTANCES
 #include "lsp/lsp.glsl"
 
 layout(local_size_x = LSP_VULKAN_GROUP_SIZE) in;

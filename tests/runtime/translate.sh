@@ -30,7 +30,7 @@ translate cells "$source/runtime/vulkan/trace.comp" -DLSP_CELLS
 translate wide "$source/runtime/vulkan/trace.comp" -DLSP_WIDE
 
 # Instances are read through addresses, which HLSL of SPIRV-Cross does not know.
-"$glslc" -O --target-env=vulkan1.1 "${includes[@]}" -DLSP_INSTANCES -o instances.spv "$source/runtime/vulkan/trace.comp"
+"$glslc" -O --target-env=vulkan1.2 "${includes[@]}" -DLSP_INSTANCES -o instances.spv "$source/runtime/vulkan/trace.comp"
 spirv-cross instances.spv --msl --msl-version 20300 --output instances.metal
 grep -q '^kernel void main0(' instances.metal
 echo "instances: Metal $(wc -l <instances.metal) lines"

@@ -202,11 +202,11 @@ LSP_API lsp_status lsp_vulkan_plan_trace(const lsp_scene* scene, const lsp_vulka
                                          const lsp_trace_options* options, lsp_vulkan_kind* kind,
                                          lsp_error* error);
 
-/* SPIR-V (for Vulkan 1.1) of the trace shader for scenes planned like `plan` (of cells: for approximate rays;
- * for exact ones set base_structure of a copy to its exact_structure), entry point "main"; with `counting`
- * nonzero the one that adds to the counters. Only base_structure and addresses of the plan matter; with
- * addresses the device's bufferDeviceAddress feature must be on, else no feature is needed. Sets *bytes to
- * the size. The words live as long as the program. */
+/* SPIR-V (for Vulkan 1.1, with addresses 1.2) of the trace shader for scenes planned like `plan` (of cells:
+ * for approximate rays; for exact ones set base_structure of a copy to its exact_structure), entry point
+ * "main"; with `counting` nonzero the one that adds to the counters. Only base_structure and addresses of the
+ * plan matter; with addresses the device's bufferDeviceAddress feature must be on, else no feature is needed.
+ * Sets *bytes to the size. The words live as long as the program. */
 LSP_API const uint32_t* lsp_vulkan_trace_spirv(const lsp_vulkan_plan* plan, int counting, size_t* bytes);
 
 /* The bindings of its descriptor set layout. */
@@ -274,7 +274,7 @@ LSP_API lsp_status lsp_vulkan_describe_asset(const lsp_scene* scene, const lsp_v
                                              const lsp_trace_options* options, lsp_vulkan_asset* asset,
                                              lsp_error* error);
 
-/* SPIR-V (for Vulkan 1.1) of the trace shader of instances, as of lsp_vulkan_trace_spirv: entry point,
+/* SPIR-V (for Vulkan 1.2) of the trace shader of instances, as of lsp_vulkan_trace_spirv: entry point,
  * layout, specialization constants and life are the same. */
 LSP_API const uint32_t* lsp_vulkan_instances_spirv(int counting, size_t* bytes);
 
