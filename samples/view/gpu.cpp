@@ -72,7 +72,8 @@ void Gpu::create_instance(bool validation) {
     unsupported("there is no Vulkan loader; install libvulkan1, or use lsp-render");
   uint32_t count = 0;
   const char** needed = glfwGetRequiredInstanceExtensions(&count);
-  if (needed == nullptr) unsupported("Vulkan cannot show on this display; use lsp-render");
+  if (needed == nullptr)
+    unsupported("no Vulkan driver shows on this display; install mesa-vulkan-drivers, or use lsp-render");
   std::vector<const char*> extensions(needed, needed + count);
 
   auto application = vk_make<VkApplicationInfo>(VK_STRUCTURE_TYPE_APPLICATION_INFO);
