@@ -281,4 +281,25 @@ bool suit(Sky& sky, const Lamp& lamp, const RenderScene& scene) {
   return true;
 }
 
+Shot choose_shot(const RenderScene& scene, RayTracer& tracer, const std::string& camera,
+                 const std::string& up, std::optional<glm::vec3> sun, float aspect) {
+  const bool given = !camera.empty();
+  const glm::vec3 axis = !up.empty() || given ? named_up(up) : likely_up(scene);
+  Shot shot;
+  shot.sky.up = axis;
+  shot.sky.sun_direction = sun ? *sun : axes(axis) * shot.sky.sun_direction;
+  if (given) {
+    shot.camera = parse_camera(camera);
+    shot.camera.up = axis;
+    return shot;
+  }
+  if (up.empty() && axis.z > 0)
+    shot.notes.emplace_back("lies flat in x and y: z is taken to be up; --up y where that is wrong");
+  const View view = default_view(scene, tracer, axis, aspect);
+  shot.camera = view.camera;
+  if (suit(shot.sky, view.lamp, scene))
+    shot.notes.emplace_back("a hall without lights: a lamp hangs in its middle");
+  return shot;
+}
+
 }  // namespace lsp::sample

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <glm/glm.hpp>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "ray_tracer.h"
 
@@ -57,5 +59,18 @@ View default_view(const RenderScene& scene, RayTracer& tracer, glm::vec3 up, flo
 // Makes the sky's light suit a scene that default_view has looked at: out in the open everything is darker,
 // and in a hall without light of its own hangs the lamp; then true.
 bool suit(Sky& sky, const Lamp& lamp, const RenderScene& scene);
+
+// What is looked at, and in which light.
+struct Shot {
+  Camera camera;
+  Sky sky;
+  std::vector<std::string> notes;  // what the user should know of the choice
+};
+
+// `camera` and `up` as the options say them; empty: chosen, with a camera y is up. Only light of a chosen
+// camera is made to suit the scene. `sun`: towards it, unit; nothing: the sky's own. Throws lsp::Failure
+// (kUsage).
+Shot choose_shot(const RenderScene& scene, RayTracer& tracer, const std::string& camera,
+                 const std::string& up, std::optional<glm::vec3> sun, float aspect);
 
 }  // namespace lsp::sample

@@ -36,9 +36,9 @@ struct Arguments {
   RenderOptions options;
 };
 
-Sky parse_sun(const std::string& text) {
-  Sky sky;
-  if (text.empty()) return sky;
+// Nothing: the sky's own.
+std::optional<glm::vec3> parse_sun(const std::string& text) {
+  if (text.empty()) return std::nullopt;
   glm::vec3 d(0.0f);
   int used = 0;
   const int count = std::sscanf(text.c_str(), "%f,%f,%f%n", &d.x, &d.y, &d.z, &used);
@@ -46,8 +46,7 @@ Sky parse_sun(const std::string& text) {
       !std::isfinite(glm::length(d))) {
     throw Failure(Exit::kUsage, "", "--sun '" + text + "' is not X,Y,Z, the direction towards the sun");
   }
-  sky.sun_direction = glm::normalize(d);
-  return sky;
+  return glm::normalize(d);
 }
 
 Effect parse_effect(const std::string& name) {
@@ -101,37 +100,6 @@ void run_heat(const Arguments& arguments, const CommonOptions& common, const Ren
                 arguments.outputs.front().c_str(), arguments.heat.c_str(), options.width, options.height,
                 options.samples, map.mean, static_cast<double>(map.top), to_string(camera).c_str());
   }
-}
-
-// What is looked at, and in which light.
-struct Shot {
-  Camera camera;
-  Sky sky;
-};
-
-Shot choose_shot(const Arguments& arguments, const CommonOptions& common, const char* program,
-                 const RenderScene& scene, RayTracer& tracer, const RenderOptions& options) {
-  const auto say = [&](const char* note) {
-    if (!common.quiet) std::cerr << program << ": " << arguments.file << ": " << note << "\n";
-  };
-  const bool given = !arguments.camera.empty();
-  const glm::vec3 up = !arguments.up.empty() || given ? named_up(arguments.up) : likely_up(scene);
-  Shot shot;
-  shot.sky = parse_sun(arguments.sun);
-  shot.sky.up = up;
-  if (arguments.sun.empty()) shot.sky.sun_direction = axes(up) * shot.sky.sun_direction;
-  if (given) {
-    shot.camera = parse_camera(arguments.camera);
-    shot.camera.up = up;
-    return shot;
-  }
-  if (arguments.up.empty() && up.z > 0)
-    say("lies flat in x and y: z is taken to be up; --up y where that is wrong");
-  const View view =
-      default_view(scene, tracer, up, static_cast<float>(options.width) / static_cast<float>(options.height));
-  shot.camera = view.camera;
-  if (suit(shot.sky, view.lamp, scene)) say("a hall without lights: a lamp hangs in its middle");
-  return shot;
 }
 
 // What the user should know before it starts.
@@ -224,7 +192,7 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
   }
   const std::optional<float> exposure = parse_exposure(arguments.exposure, !arguments.camera.empty());
   if (!arguments.camera.empty()) parse_camera(arguments.camera);
-  parse_sun(arguments.sun);
+  const std::optional<glm::vec3> sun = parse_sun(arguments.sun);
 
   // Without this oneTBB would never use more threads than there are cores.
   std::optional<tbb::global_control> allowed;
@@ -236,7 +204,12 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
   const uint32_t uses = LSP_USE_EXACT | (approximate ? LSP_USE_APPROXIMATE : 0u);
   const auto tracer = arguments.backend == "vulkan" ? make_vulkan_tracer(scene, uses)
                                                     : make_cpu_tracer(scene, options.threads);
-  Shot shot = choose_shot(arguments, common, program, scene, *tracer, options);
+  const float aspect = static_cast<float>(options.width) / static_cast<float>(options.height);
+  const Shot shot = choose_shot(scene, *tracer, arguments.camera, arguments.up, sun, aspect);
+  if (!common.quiet) {
+    for (const std::string& note : shot.notes)
+      std::cerr << program << ": " << arguments.file << ": " << note << "\n";
+  }
   if (!arguments.heat.empty()) return run_heat(arguments, common, scene, shot.camera, options);
   const bool show_progress = !common.quiet && isatty(STDERR_FILENO) != 0;
   RenderReport report;

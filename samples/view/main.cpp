@@ -213,39 +213,30 @@ void run(Arguments& arguments, const CommonOptions& common) {
   ViewState& state = arguments.state;
   state.approximate = to_trace_options(arguments.trace, true);
   state.effect = static_cast<uint32_t>(std::ranges::find(kEffects, arguments.effect) - kEffects.begin());
-  std::optional<Camera> camera;
-  if (!arguments.camera.empty()) camera = parse_camera(arguments.camera);
-  const std::optional<float> exposure = parse_exposure(arguments.exposure, camera.has_value());
+  if (!arguments.camera.empty()) parse_camera(arguments.camera);
+  const std::optional<float> exposure = parse_exposure(arguments.exposure, !arguments.camera.empty());
 
   const std::unique_ptr<RenderScene> opened = open_scene(arguments.file, common);
   const RenderScene& scene = *opened;
   say_notes(arguments, common, scene);
   state.split = arguments.split.value_or(scene.has_tables() ? 0.0f : 1.0f);
   const float aspect = static_cast<float>(size.x) / static_cast<float>(size.y);
-  const glm::vec3 up = !arguments.up.empty() || camera ? named_up(arguments.up) : likely_up(scene);
-  if (arguments.up.empty() && up.z > 0)
-    say(common, arguments.file, {"lies flat in x and y: z is taken to be up; --up y where that is wrong"});
-  const View view = default_view(scene, *make_cpu_tracer(scene, 0), up, aspect);
-  state.camera = view.camera;
-  Sky sky;
-  sky.up = up;
-  sky.sun_direction = axes(up) * sky.sun_direction;
-  if (suit(sky, view.lamp, scene))
-    say(common, arguments.file, {"a hall without lights: a lamp hangs in its middle"});
-  if (camera) state.camera = *camera;
-  state.camera.up = up;
-  state.exposure = exposure ? *exposure : automatic_exposure(scene, sky, state, size);
+  const Shot shot =
+      choose_shot(scene, *make_cpu_tracer(scene, 0), arguments.camera, arguments.up, std::nullopt, aspect);
+  say(common, arguments.file, shot.notes);
+  state.camera = shot.camera;
+  state.exposure = exposure ? *exposure : automatic_exposure(scene, shot.sky, state, size);
 
   const Window window(size);
   Gpu gpu(window.handle(), arguments.validation);
   ViewReport shown;
   {
-    Viewer viewer(gpu, window.handle(), scene, sky);
+    Viewer viewer(gpu, window.handle(), scene, shot.sky);
     show(viewer, window.handle(), state, arguments, scene);
     shown = viewer.report();
     if (!arguments.screenshot.empty()) {
-      const Viewer::Screenshot shot = viewer.screenshot();
-      write_file(arguments.screenshot, rgba_png(shot.width, shot.height, shot.rgba));
+      const Viewer::Screenshot taken = viewer.screenshot();
+      write_file(arguments.screenshot, rgba_png(taken.width, taken.height, taken.rgba));
     }
   }
   report(shown, state, arguments, common, gpu, scene);

@@ -286,6 +286,32 @@ TEST_F(View, BounceIsThatOfLspRender) {
   EXPECT_GT(difference(seen[0], seen[1], 0, kWidth).mean, 1.0) << "both axes look the same";
 }
 
+// Every instance is lit with its own asset's materials, where its transform has put them.
+TEST_F(View, BounceOfInstancesIsThatOfLspRender) {
+  std::ofstream(file("red.mtl")) << "newmtl white\nKd 0.9 0.9 0.9\nnewmtl red\nKd 0.9 0.1 0.1\n";
+  std::ofstream(file("red.obj")) << "mtllib red.mtl\nusemtl red\n" << read(file("corner.obj"));
+  for (const std::string name : {"corner", "red"})
+    ASSERT_EQ(
+        run("lsp-bake " + file(name + ".obj") + " -o " + file(name + "_wide.lsp") + " --quiet --base wide"),
+        0);
+  std::ofstream(file("two.json")) << R"({"lsp_scene": 1, "assets": ["corner_wide.lsp", "red_wide.lsp"],
+      "instances": [{"asset": 1, "transform": [0,0,-1.5,5, 0,1,0,0, -0.7,0,0,5]},
+                    {"asset": 0, "transform": [1,0,0,0, 0,1,0,0, 0,0,1,0]},
+                    {"asset": 1, "transform": [1,0,0,-5, 0,2,0,0, 0,0,1,0]}]})";
+  const std::string options =
+      " --quiet --effect diffuse --exposure 0 --size 160x90 --camera 9,9,14:1,1,2:50 ";
+  ASSERT_EQ(run("lsp-view " + file("two.json") + options + "--frames 4 --screenshot " + file("v.png")), 0);
+  ASSERT_EQ(run("lsp-render " + file("two.json") + options + "--samples 4 -o " + file("r.png")), 0);
+  const Shot seen = read_png(file("v.png"));
+  EXPECT_LT(difference(seen, read_png(file("r.png")), 0, kWidth).mean, 0.05);
+  size_t red = 0, grey = 0;
+  for (size_t i = 0; i < seen.rgba.size(); i += 4) {
+    red += seen.rgba[i] > 2 * seen.rgba[i + 1] + 20;
+    grey += seen.rgba[i] > 20 && seen.rgba[i] < 2 * seen.rgba[i + 1];
+  }
+  EXPECT_GT(std::min(red, grey), 200u);
+}
+
 // The dial, lod and the line do what they say.
 TEST_F(View, OptionsReachTheShaders) {
   const Shot fast = shot("cells.lsp", "--split 0 --quality fast");

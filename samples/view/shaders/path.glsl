@@ -56,7 +56,7 @@ void add(Pixel pixel, vec3 radiance) {
 
 /* Unit vectors that make a right-handed frame with unit n (Duff et al. 2017). */
 void make_frame(vec3 n, out vec3 tangent, out vec3 bitangent) {
-  float s = n.z < 0.0 ? -1.0 : 1.0;
+  float s = floatBitsToInt(n.z) < 0 ? -1.0 : 1.0; /* as copysign: -0 has a sign */
   float a = -1.0 / (s + n.z);
   float b = n.x * n.y * a;
   tangent = vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x);
