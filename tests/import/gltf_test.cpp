@@ -82,6 +82,31 @@ TEST_F(Gltf, UrisAsExportersWriteThem) {
   EXPECT_TRUE(import_with("back\\slash.bin", "back\\slash.bin").notes.empty()) << "such a file may exist";
 }
 
+TEST_F(Gltf, ABufferShorterThanDeclaredIsReadWhereItIsWhole) {
+  Document document = triangle();
+  document.root["buffers"] = {{{"byteLength", document.bytes.size() + 3}, {"uri", "a.bin"}}};
+  const std::string bytes = document.bytes;
+  document.bytes.clear();
+  write("a.bin", bytes);
+  const Mesh mesh = import(document);
+  EXPECT_EQ(mesh.triangles.size(), 1u);
+  EXPECT_TRUE(has_note(mesh, "declared with " + std::to_string(bytes.size() + 3)));
+  write("a.bin", bytes.substr(0, bytes.size() - 1));
+  const Refusal cut = MeshFiles::refusal("a.gltf", document.gltf());
+  EXPECT_EQ(cut.exit, Exit::kInvalid);
+  EXPECT_NE(cut.message.find("cut short"), cut.message.npos) << cut.message;
+}
+
+TEST_F(Gltf, ScenesWithoutADefaultAreAllRead) {
+  Document document = triangle();
+  document.node({{"mesh", 0}, {"translation", {5, 0, 0}}});
+  document.root["scenes"] = {{{"nodes", {0}}}, {{"nodes", {1}}}};
+  document.root.erase("scene");
+  const Mesh mesh = import(document);
+  EXPECT_EQ(mesh.triangles.size(), 2u);
+  EXPECT_TRUE(has_note(mesh, "none of its scenes is the default one"));
+}
+
 TEST_F(Gltf, WhatIsNotReadIsNotedOnce) {
   Document document = triangle();
   json& attributes = document.root["meshes"][0]["primitives"][0]["attributes"];
@@ -311,6 +336,7 @@ TEST_F(Gltf, MaterialsAndTheirExtensions) {
   document.root["meshes"][0]["primitives"].push_back({{"attributes", {{"POSITION", 0}}}, {"material", 77}});
   const Mesh mesh = import(document);
   ASSERT_EQ(mesh.triangles.size(), 3u);
+  EXPECT_TRUE(has_note(mesh, "specular factors of KHR_materials_pbrSpecularGlossiness are not read"));
   const lsp::Material& lamp = mesh.materials[mesh.material_ids[0]];
   EXPECT_EQ(lamp.name, "lamp \xC3\xA9");
   EXPECT_FLOAT_EQ(lamp.base_color.g, 0.2f);
@@ -483,6 +509,8 @@ TEST_F(Gltf, DocumentsThatAreNone) {
           "a.gltf", "{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"byteLength\":9,\"uri\":\"gone.bin\"}]}")
           .exit,
       Exit::kFile);
+  const Refusal nan = MeshFiles::refusal("a.gltf", "{\"asset\": {\"version\": \"2.0\"}, \"min\": NaN}");
+  EXPECT_NE(nan.message.find("at byte 38"), nan.message.npos) << nan.message;
   const std::string glb = triangle().glb();
   EXPECT_EQ(MeshFiles::refusal("a.glb", glb.substr(0, 4) + std::string("\1\0\0\0", 4) + glb.substr(8)).exit,
             Exit::kUnsupported);

@@ -1,5 +1,6 @@
 #include "import/gltf_document.h"
 
+#include <algorithm>
 #include <cstring>
 
 #include "import/gltf_reduce.h"
@@ -98,8 +99,14 @@ json parse_json(const std::string& file, std::string_view text, Budget& budget) 
   budget.charge(file, objects, 1024);
   budget.charge(file, values, 96);
   budget.charge(file, text.size(), 2);
-  json document = json::parse(text, nullptr, false);
-  if (document.is_discarded()) fail(file, "is not valid JSON");
+  json document;
+  try {
+    document = json::parse(text);
+  } catch (const json::parse_error& error) {
+    fail(file, "is not valid JSON at byte " + std::to_string(error.byte) + " of it");
+  } catch (const json::exception&) {  // a number beyond all bounds
+    fail(file, "is not valid JSON");
+  }
   if (!document.is_object()) fail(file, "is not a glTF document");
   return document;
 }
@@ -150,11 +157,13 @@ void read_buffers(const std::filesystem::path& path, const json& document, Bytes
       out.buffers.push_back({});
       continue;
     }
+    // Writers count padding that they do not write; what reads beyond the end is refused where it reads.
     if (bytes.size() < bytes_wanted) {
-      fail(out.file, "has buffer " + std::to_string(i) + " declared with " + std::to_string(bytes_wanted) +
-                         " bytes and holding " + std::to_string(bytes.size()));
+      out.notes.push_back("buffer " + std::to_string(i) + " is declared with " +
+                          std::to_string(bytes_wanted) + " bytes and holds " + std::to_string(bytes.size()) +
+                          ", it is read as it is");
     }
-    out.buffers.push_back(bytes.first(bytes_wanted));
+    out.buffers.push_back(bytes.first(std::min<uint64_t>(bytes_wanted, bytes.size())));
   }
 }
 

@@ -203,6 +203,11 @@ void GltfPrimitives::read_colors(const tinygltf::Primitive& source, const std::v
   const Values colors = values_of("COLOR_0");
   const bool colored =
       std::any_of(colors.floats.begin(), colors.floats.end(), [](float x) { return x != 1; });
+  // What morph targets add up to is cut by the specification.
+  const bool beyond =
+      std::any_of(colors.floats.begin(), colors.floats.end(), [](float x) { return !(x >= 0 && x <= 1); });
+  if (beyond && weights.empty())
+    builder_.note(document_.file + ": vertex colours are cut to the range from 0 to 1");
   const Surface& surface = entry.surface;
   if (!surface.has_textures() && !colored) return;
   const auto coordinates = [&](const TextureUse& use) {
@@ -241,6 +246,10 @@ void GltfPrimitives::read_joints(const tinygltf::Primitive& source, GltfPrimitiv
     const std::string number = std::to_string(set);
     Values joint = read_values(source, "JOINTS_" + number, 4),
            weight = read_values(source, "WEIGHTS_" + number, 4);
+    if (joint.floats.empty() != weight.floats.empty())
+      builder_.note(document_.file +
+                    ": a primitive has joints without weights or weights without joints, set " + number +
+                    " of them is not read");
     if (joint.floats.empty() || weight.floats.empty()) break;
     if (joint.floats.size() != 4 * out.positions.size() || weight.floats.size() != joint.floats.size())
       fail("has more or fewer joints or weights than positions");
