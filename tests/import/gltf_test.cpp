@@ -402,6 +402,11 @@ TEST_F(Gltf, Draco) {
     ASSERT_EQ(decoded.triangles.size(), size_t(faces));
     EXPECT_NEAR(area(decoded), faces * 0.5, 0.05);  // 16 bits over a box of 49
     for (size_t t = 0; t < size_t(faces); ++t) EXPECT_NEAR(decoded.normals[t][0].z, 1.0f, 0.01f);
+    // An accessor without bytes that Draco's data does not hold is zeros.
+    Document zeros = document;
+    json& attributes = zeros.root["meshes"][0]["primitives"][0]["attributes"];
+    attributes["COLOR_0"] = zeros.accessor(-1, kFloat, 3 * faces, "VEC3");
+    EXPECT_EQ(import(zeros).color(0).base_color, glm::vec3(0));
     // Damage in every byte: read or refused, never worse.
     for (size_t i = 0; i < document.bytes.size(); i += 11) {
       Document damaged = document;

@@ -77,7 +77,7 @@ TEST_F(Variants, ObjNamesWhatItDoesNotRead) {
   EXPECT_TRUE(has_note(import("a.obj", square + "usemtl moss\nf 1 2 3\n"), "taken as grey: moss"));
   const Refusal points = refusal("a.obj", square + "p 1 2\n");
   EXPECT_EQ(points.exit, lsp::Exit::kInvalid);
-  EXPECT_NE(points.message.find("1 lines, points"), points.message.npos) << points.message;
+  EXPECT_NE(points.message.find("noted: 1 lines, points"), points.message.npos) << points.message;
 }
 
 TEST_F(Variants, MtlNamesWhatItDoesNotRead) {

@@ -134,7 +134,9 @@ int64_t GltfMaterials::image_at(const json& info) {
   const int64_t index = index_member(info, "index");
   const json& texture = element(member(document_.looks, "textures"), index);
   const int64_t image = image_of(texture);
-  if (texture.is_null()) {
+  if (index < 0) {
+    note("a texture without a number is not read; factors hold without it");
+  } else if (texture.is_null()) {
     note("texture " + std::to_string(index) + " is not there; factors hold without it");
   } else if (image < 0) {
     note("texture " + std::to_string(index) + " names no picture that is read; factors hold without it");

@@ -64,6 +64,13 @@ void drop_unused(GltfPrimitive& primitive) {
   gather(primitive.weights, primitive.joints_each);
 }
 
+// The number of an attribute in Draco's data, -1 where it is not in there.
+int draco_id(const tinygltf::Value& extension, const std::string& name) {
+  if (!extension.IsObject() || !extension.Get("attributes").IsObject()) return -1;
+  const tinygltf::Value& value = extension.Get("attributes").Get(name);
+  return value.IsInt() ? value.Get<int>() : -1;
+}
+
 }  // namespace
 
 GltfPrimitives::GltfPrimitives(const GltfDocument& document, GltfAccessors& accessors,
@@ -169,7 +176,8 @@ GltfPrimitives::Values GltfPrimitives::read_values(const tinygltf::Primitive& so
   if (decoded != decoded_.end() && decoded->second.values.contains(name)) {
     out.floats = decoded->second.values.at(name);
     accessors_.overlay_sparse(accessors_.at(found->second), out.components, out.floats);
-  } else if (decoded == decoded_.end() || accessors_.at(found->second).bufferView >= 0) {
+  } else if (decoded == decoded_.end() || accessors_.at(found->second).bufferView >= 0 ||
+             draco_id(source.extensions.at("KHR_draco_mesh_compression"), name) < 0) {
     out.floats = accessors_.floats(found->second, out.components);
   }
   return out;
@@ -307,11 +315,7 @@ void GltfPrimitives::decode_all_draco() {
 
 DracoJob GltfPrimitives::draco_job(const tinygltf::Primitive& source, std::vector<std::string>& names) {
   const tinygltf::Value& extension = source.extensions.at("KHR_draco_mesh_compression");
-  const auto id = [&](const std::string& name) {
-    if (!extension.IsObject() || !extension.Get("attributes").IsObject()) return -1;
-    const tinygltf::Value& value = extension.Get("attributes").Get(name);
-    return value.IsInt() ? value.Get<int>() : -1;
-  };
+  const auto id = [&](const std::string& name) { return draco_id(extension, name); };
   const tinygltf::Value none;
   const tinygltf::Value& view = extension.IsObject() ? extension.Get("bufferView") : none;
   if (!view.IsInt() || id("POSITION") < 0)

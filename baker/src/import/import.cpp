@@ -49,14 +49,13 @@ void check_pose(const PoseRequest& pose) {
 void refuse_input(const std::filesystem::path& path, uint64_t count, const Rejected& before,
                   const Rejected& after, std::span<const std::string> notes) {
   if (count == 0) {
-    std::string what;
+    std::string noted;
     const std::string prefix = path.string() + ": ";
-    for (const std::string& note : notes.first(std::min<size_t>(notes.size(), 3))) {
-      const bool own = note.starts_with(prefix);
-      what += (what.empty() ? " (" : "; ") + note.substr(own ? prefix.size() : 0);
-    }
+    for (const std::string& note : notes.first(std::min<size_t>(notes.size(), 3)))
+      noted +=
+          (noted.empty() ? " (noted: " : "; ") + note.substr(note.starts_with(prefix) ? prefix.size() : 0);
     throw Failure(Exit::kInvalid, path.string(),
-                  "holds no triangle" + what + (what.empty() ? "" : ")") + ", give a file with a mesh in it");
+                  "holds no triangle, give a file with a mesh in it" + noted + (noted.empty() ? "" : ")"));
   }
   const std::string why = "none of its " + std::to_string(count) + " triangles can be used (" +
                           std::to_string(after.degenerate - before.degenerate) + " degenerate, " +
