@@ -97,4 +97,16 @@ TEST_F(FileNames, MaterialLibrariesAndTheirPicturesInAnyCaseAndInQuotes) {
   EXPECT_EQ(any_case.sources[0].size(), 2u) << "it is a source";
 }
 
+TEST_F(FileNames, PicturesBesideTheMeshWhereTheLibraryIsElsewhere) {
+  std::filesystem::create_directory(folder_ / "mats");
+  std::filesystem::create_directory(folder_ / "tex");
+  write("tex/red.png", rgba_png(1, 1, {255, 0, 0, 255}));
+  write("mats/a.mtl", "newmtl m\nKd 1 1 1\nmap_Kd tex/red.png\n");
+  const Mesh mesh =
+      import("a.obj", "mtllib mats/a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl m\nf 1/1 2/1 3/1\n");
+  EXPECT_EQ(mesh.color(0).base_color, kRed);
+  EXPECT_TRUE(has_note(mesh, "the picture tex/red.png is read from"));
+  EXPECT_EQ(mesh.sources[0].size(), 3u);
+}
+
 }  // namespace
