@@ -109,4 +109,15 @@ TEST_F(FileNames, PicturesBesideTheMeshWhereTheLibraryIsElsewhere) {
   EXPECT_EQ(mesh.sources[0].size(), 3u);
 }
 
+TEST_F(FileNames, NamesInACodePageAreNoReasonToRefuseADocument) {
+  Document document;
+  document.node({{"mesh", document.mesh({{"attributes", {{"POSITION", document.vec3(kTriangle)}}}})},
+                 {"name", "Tuer"}});
+  std::string text = document.gltf();
+  text.replace(text.find("Tuer"), 4, "T\xFCr");
+  const Mesh mesh = import("a.gltf", text);
+  EXPECT_EQ(mesh.triangles.size(), 1u);
+  EXPECT_TRUE(has_note(mesh, "no valid UTF-8"));
+}
+
 }  // namespace

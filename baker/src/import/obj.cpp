@@ -128,7 +128,7 @@ class ObjReader {
     const auto take_value = [&] { return take_word(line, word) && word.front() != '#'; };
     for (; count < 3 && take_value(); ++count) color[count] = float(number_of(word));
     // A weight, which polygons do not have, or an alpha: 1 says nothing.
-    if (count == 1) values_left_ = values_left_ || color.x != 1;
+    values_left_ = values_left_ || count == 2 || (count == 1 && color.x != 1);
     if (count == 3 && take_value()) values_left_ = values_left_ || number_of(word) != 1;
     const bool given = count == 3 && std::isfinite(color.x + color.y + color.z);
     if (!given && soup_.colors.empty()) return;
