@@ -255,8 +255,11 @@ TEST_F(Gltf, TheDefaultSceneOrAllRoots) {
   EXPECT_EQ(corner(mesh, 0, 0).z, 2.0f) << "depth first, in the scene's order";
   EXPECT_EQ(corner(mesh, 1, 0).z, 3.0f);
   EXPECT_EQ(corner(mesh, 2, 0).z, 0.0f);
+  EXPECT_FALSE(has_note(mesh, "in no scene"));
   document.root["scene"] = 0;
-  EXPECT_EQ(import(document).triangles.size(), 1u);
+  const Mesh part = import(document);
+  EXPECT_EQ(part.triangles.size(), 1u);
+  EXPECT_TRUE(has_note(part, "2 nodes with meshes are in no scene that is read"));
   document.root["scene"] = 7;
   EXPECT_EQ(refusal(document).exit, Exit::kInvalid);
 }
