@@ -129,6 +129,16 @@ TEST_F(GltfColor, JpegOfFourInks) {
     expect_color(mesh.colors[0].base_color, {linear(200), linear(100), linear(50)}, 0.02f);
     EXPECT_TRUE(mesh.notes.empty());
   }
+  // More codes than a byte can count, and a table that begins at its segment's last byte.
+  std::string many = start + body, late = many;
+  const size_t table = many.find("\xFF\xC4") + 4;
+  many[table + 8] = many[table + 9] = late[table + 8] = late[table + 9] = '\xFF';
+  late[table - 1] = 3;
+  for (const std::string& jpeg : {many, late, "\xFF" + many}) {
+    Square square;
+    square.base()["baseColorTexture"] = square.texture(jpeg);
+    EXPECT_TRUE(has_note(import(square), "is damaged"));
+  }
 }
 
 TEST_F(GltfColor, PicturesInOtherFormatsAreNotedByTheirNames) {
