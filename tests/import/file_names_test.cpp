@@ -83,7 +83,10 @@ TEST_F(FileNames, MaterialLibrariesAndTheirPicturesInAnyCaseAndInQuotes) {
   for (const char* map : {"map_Kd Red Wall.PNG\n", "map_Kd \"Red Wall.PNG\"\n",
                           "map_Kd D:\\art\\Red Wall.PNG \r\n", "MAP_KD -clamp on Red Wall.PNG\n"}) {
     EXPECT_EQ(with_library(map).color(0).base_color, kRed) << map;
-    EXPECT_TRUE(with_library(map).notes.empty()) << map;
+    const bool elsewhere = std::string_view(map).find("art") != std::string_view::npos;
+    EXPECT_EQ(has_note(with_library(map), "the picture D:\\art\\Red Wall.PNG is read from"), elsewhere)
+        << map;
+    EXPECT_EQ(with_library(map).notes.size(), elsewhere ? 1u : 0u) << map;
   }
   EXPECT_EQ(with_library("map_Kd RED WALL.png\n").color(0).base_color, kRed);
   EXPECT_TRUE(has_note(with_library("map_Kd RED WALL.png\n"), "the picture RED WALL.png is read from"));
@@ -92,6 +95,29 @@ TEST_F(FileNames, MaterialLibrariesAndTheirPicturesInAnyCaseAndInQuotes) {
   EXPECT_EQ(any_case.color(0).base_color, kRed);
   EXPECT_TRUE(has_note(any_case, "the material library A.MTL is read from"));
   EXPECT_EQ(any_case.sources[0].size(), 2u) << "it is a source";
+}
+
+TEST_F(FileNames, PicturesBesideTheMeshWhereTheLibraryIsElsewhere) {
+  std::filesystem::create_directory(folder_ / "mats");
+  std::filesystem::create_directory(folder_ / "tex");
+  write("tex/red.png", rgba_png(1, 1, {255, 0, 0, 255}));
+  write("mats/a.mtl", "newmtl m\nKd 1 1 1\nmap_Kd tex/red.png\n");
+  const Mesh mesh =
+      import("a.obj", "mtllib mats/a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl m\nf 1/1 2/1 3/1\n");
+  EXPECT_EQ(mesh.color(0).base_color, kRed);
+  EXPECT_TRUE(has_note(mesh, "the picture tex/red.png is read from"));
+  EXPECT_EQ(mesh.sources[0].size(), 3u);
+}
+
+TEST_F(FileNames, NamesInACodePageAreNoReasonToRefuseADocument) {
+  Document document;
+  document.node({{"mesh", document.mesh({{"attributes", {{"POSITION", document.vec3(kTriangle)}}}})},
+                 {"name", "Tuer"}});
+  std::string text = document.gltf();
+  text.replace(text.find("Tuer"), 4, "T\xFCr");
+  const Mesh mesh = import("a.gltf", text);
+  EXPECT_EQ(mesh.triangles.size(), 1u);
+  EXPECT_TRUE(has_note(mesh, "no valid UTF-8"));
 }
 
 }  // namespace

@@ -108,6 +108,73 @@ TEST_F(GltfColor, EveryKindOfPng) {
   }
 }
 
+// Eight by eight equal texels in CMYK, inks inverted as everywhere, with and without Adobe's marker.
+TEST_F(GltfColor, JpegOfFourInks) {
+  const std::string hex =
+      "ffdb00430001010101010101010101010101010102010101010102010101020202020202020202030304030303030302020304"
+      "030304040404040203050504040504040404ffc000140800080008044311004d11005911004b1100ffc4001500010100000000"
+      "000000000000000000000a08ffc40014100100000000000000000000000000000000ffda000e0443004d0059004b00003f0048"
+      "087c63cfe1ffd9";
+  std::string body;
+  for (size_t i = 0; i < hex.size(); i += 2) body += char(std::stoi(hex.substr(i, 2), nullptr, 16));
+  const std::string start = "\xFF\xD8", marker(
+                                            "\xFF\xEE\0\x0E"
+                                            "Adobe\0\x64\0\0\0\0\0",
+                                            16);
+  for (const std::string& jpeg : {start + body, start + marker + body}) {
+    Square square;
+    square.base()["baseColorTexture"] = square.texture(jpeg);
+    const Mesh mesh = import(square);
+    ASSERT_EQ(mesh.colors.size(), 2u);
+    expect_color(mesh.colors[0].base_color, {linear(200), linear(100), linear(50)}, 0.02f);
+    EXPECT_TRUE(mesh.notes.empty());
+  }
+  // More codes than a byte can count, and a table that begins at its segment's last byte.
+  std::string many = start + body, late = many;
+  const size_t table = many.find("\xFF\xC4") + 4;
+  many[table + 8] = many[table + 9] = late[table + 8] = late[table + 9] = '\xFF';
+  late[table - 1] = 3;
+  for (const std::string& jpeg : {many, late, "\xFF" + many}) {
+    Square square;
+    square.base()["baseColorTexture"] = square.texture(jpeg);
+    EXPECT_TRUE(has_note(import(square), "is damaged"));
+  }
+}
+
+TEST_F(GltfColor, PicturesInOtherFormatsAreNotedByTheirNames) {
+  const std::pair<std::string, std::string> pictures[] = {{"DDS |", "DDS"},
+                                                          {"GIF89a", "GIF"},
+                                                          {"8BPS", "Photoshop"},
+                                                          {"v/1\x01", "OpenEXR"},
+                                                          {std::string("\0\0\0\x1C"
+                                                                       "ftypavif",
+                                                                       12),
+                                                           "AVIF"},
+                                                          {"<!DOCTYPE html>", "HTML"},
+                                                          {"II*", "TIFF"}};
+  for (const auto& [bytes, name] : pictures) {
+    Square square;
+    square.base()["baseColorTexture"] = square.texture(bytes + std::string(40, ' '));
+    EXPECT_TRUE(has_note(import(square), "is " + std::string(name == "Photoshop" ? "a " : "") + name))
+        << name;
+  }
+}
+
+TEST_F(GltfColor, ATextureWithoutAPictureIsNotedAsThat) {
+  Square square;
+  json texture = square.texture("DDS ");
+  square.document.root["textures"][0] = {{"extensions", {{"MSFT_texture_dds", {{"source", 0}}}}}};
+  square.base()["baseColorTexture"] = texture;
+  json& material = square.material();
+  material["emissiveFactor"] = {1, 1, 1};
+  material["emissiveTexture"] = {{"index", 7}};
+  const Mesh mesh = import(square);
+  EXPECT_TRUE(has_note(mesh, "texture 0 names no picture that is read; factors hold without it"));
+  EXPECT_TRUE(has_note(mesh, "texture 7 is not there; factors hold without it"));
+  EXPECT_TRUE(has_note(mesh, "MSFT_texture_dds"));
+  EXPECT_EQ(mesh.notes.size(), 3u);
+}
+
 TEST_F(GltfColor, PicturesBesideTheFileAndInIt) {
   const std::string png = rgba_png(1, 1, {255, 0, 0, 255});
   write("a b.png", png);
@@ -222,6 +289,14 @@ TEST_F(GltfColor, VertexColoursOfEveryTypeMultiply) {
       expect_color(import(square).colors[0].base_color, {0.2f * texel, 0.1f * texel, 0});
     }
   }
+}
+
+TEST_F(GltfColor, VertexColoursBeyondOneAreCutWithANote) {
+  Square square;
+  square.attributes["COLOR_0"] = square.document.vec3({2, 0.5, 0, 2, 0.5, 0, 2, 0.5, 0, 2, 0.5, 0});
+  const Mesh mesh = import(square);
+  expect_color(mesh.color(0).base_color, {1, 0.5, 0});
+  EXPECT_TRUE(has_note(mesh, "vertex colours are cut to the range from 0 to 1"));
 }
 
 TEST_F(GltfColor, VertexColoursVaryOverTheTexels) {

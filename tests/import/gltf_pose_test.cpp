@@ -85,6 +85,13 @@ TEST_F(GltfPose, NormalsTurnWithTheirJointsAndMirrorsFlip) {
   EXPECT_GT(glm::dot(face_normal(mirrored, 0), mirrored.normals[0][0]), 0.999f);
 }
 
+TEST_F(GltfPose, JointsWithoutWeightsAreNoted) {
+  Skinned skinned({});
+  skinned.finish();
+  skinned.document.root["meshes"][0]["primitives"][0]["attributes"].erase("WEIGHTS_0");
+  EXPECT_TRUE(has_note(import(skinned.document), "joints without weights"));
+}
+
 TEST_F(GltfPose, BrokenSkinsAreRefused) {
   Skinned skinned({});
   skinned.finish();

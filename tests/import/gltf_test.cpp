@@ -82,6 +82,31 @@ TEST_F(Gltf, UrisAsExportersWriteThem) {
   EXPECT_TRUE(import_with("back\\slash.bin", "back\\slash.bin").notes.empty()) << "such a file may exist";
 }
 
+TEST_F(Gltf, ABufferShorterThanDeclaredIsReadWhereItIsWhole) {
+  Document document = triangle();
+  document.root["buffers"] = {{{"byteLength", document.bytes.size() + 3}, {"uri", "a.bin"}}};
+  const std::string bytes = document.bytes;
+  document.bytes.clear();
+  write("a.bin", bytes);
+  const Mesh mesh = import(document);
+  EXPECT_EQ(mesh.triangles.size(), 1u);
+  EXPECT_TRUE(has_note(mesh, "declared with " + std::to_string(bytes.size() + 3)));
+  write("a.bin", bytes.substr(0, bytes.size() - 1));
+  const Refusal cut = MeshFiles::refusal("a.gltf", document.gltf());
+  EXPECT_EQ(cut.exit, Exit::kInvalid);
+  EXPECT_NE(cut.message.find("cut short"), cut.message.npos) << cut.message;
+}
+
+TEST_F(Gltf, ScenesWithoutADefaultAreAllRead) {
+  Document document = triangle();
+  document.node({{"mesh", 0}, {"translation", {5, 0, 0}}});
+  document.root["scenes"] = {{{"nodes", {0}}}, {{"nodes", {1}}}};
+  document.root.erase("scene");
+  const Mesh mesh = import(document);
+  EXPECT_EQ(mesh.triangles.size(), 2u);
+  EXPECT_TRUE(has_note(mesh, "none of its scenes is the default one"));
+}
+
 TEST_F(Gltf, WhatIsNotReadIsNotedOnce) {
   Document document = triangle();
   json& attributes = document.root["meshes"][0]["primitives"][0]["attributes"];
@@ -230,8 +255,11 @@ TEST_F(Gltf, TheDefaultSceneOrAllRoots) {
   EXPECT_EQ(corner(mesh, 0, 0).z, 2.0f) << "depth first, in the scene's order";
   EXPECT_EQ(corner(mesh, 1, 0).z, 3.0f);
   EXPECT_EQ(corner(mesh, 2, 0).z, 0.0f);
+  EXPECT_FALSE(has_note(mesh, "in no scene"));
   document.root["scene"] = 0;
-  EXPECT_EQ(import(document).triangles.size(), 1u);
+  const Mesh part = import(document);
+  EXPECT_EQ(part.triangles.size(), 1u);
+  EXPECT_TRUE(has_note(part, "2 nodes with meshes are in no scene that is read"));
   document.root["scene"] = 7;
   EXPECT_EQ(refusal(document).exit, Exit::kInvalid);
 }
@@ -311,6 +339,7 @@ TEST_F(Gltf, MaterialsAndTheirExtensions) {
   document.root["meshes"][0]["primitives"].push_back({{"attributes", {{"POSITION", 0}}}, {"material", 77}});
   const Mesh mesh = import(document);
   ASSERT_EQ(mesh.triangles.size(), 3u);
+  EXPECT_TRUE(has_note(mesh, "specular factors of KHR_materials_pbrSpecularGlossiness are not read"));
   const lsp::Material& lamp = mesh.materials[mesh.material_ids[0]];
   EXPECT_EQ(lamp.name, "lamp \xC3\xA9");
   EXPECT_FLOAT_EQ(lamp.base_color.g, 0.2f);
@@ -376,6 +405,11 @@ TEST_F(Gltf, Draco) {
     ASSERT_EQ(decoded.triangles.size(), size_t(faces));
     EXPECT_NEAR(area(decoded), faces * 0.5, 0.05);  // 16 bits over a box of 49
     for (size_t t = 0; t < size_t(faces); ++t) EXPECT_NEAR(decoded.normals[t][0].z, 1.0f, 0.01f);
+    // An accessor without bytes that Draco's data does not hold is zeros.
+    Document zeros = document;
+    json& attributes = zeros.root["meshes"][0]["primitives"][0]["attributes"];
+    attributes["COLOR_0"] = zeros.accessor(-1, kFloat, 3 * faces, "VEC3");
+    EXPECT_EQ(import(zeros).color(0).base_color, glm::vec3(0));
     // Damage in every byte: read or refused, never worse.
     for (size_t i = 0; i < document.bytes.size(); i += 11) {
       Document damaged = document;
@@ -483,6 +517,8 @@ TEST_F(Gltf, DocumentsThatAreNone) {
           "a.gltf", "{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"byteLength\":9,\"uri\":\"gone.bin\"}]}")
           .exit,
       Exit::kFile);
+  const Refusal nan = MeshFiles::refusal("a.gltf", "{\"asset\": {\"version\": \"2.0\"}, \"min\": NaN}");
+  EXPECT_NE(nan.message.find("at byte 38"), nan.message.npos) << nan.message;
   const std::string glb = triangle().glb();
   EXPECT_EQ(MeshFiles::refusal("a.glb", glb.substr(0, 4) + std::string("\1\0\0\0", 4) + glb.substr(8)).exit,
             Exit::kUnsupported);

@@ -797,7 +797,7 @@ TEST_F(Off, ColoursOfVerticesAndFaces) {
   const Mesh faces =
       import("a.off", "OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2 0 128 255\n3 0 2 3 7\n");
   EXPECT_NEAR(faces.color(0).base_color.g, lsp::linear_of_srgb(128 / 255.0), 1e-6);
-  EXPECT_TRUE(has_note(faces, "by number"));
+  EXPECT_TRUE(has_note(faces, "colours of faces by their number"));
 }
 
 TEST_F(Off, Refusals) {

@@ -56,6 +56,117 @@ TEST_F(Variants, ObjVerticesWithoutAColourAreWhite) {
   EXPECT_EQ(mesh.color(1).base_color, glm::vec3(1));
 }
 
+TEST_F(Variants, ObjCommentsNeverGoOnAndBlanksMayFollowABackslash) {
+  const char* square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+  const Mesh comment = import("a.obj", std::string("# from C:\\out\\\n") + square + "f 1 2 3 4\n");
+  EXPECT_EQ(comment.triangles.size(), 2u);
+  const Mesh blanks = import("a.obj", std::string(square) + "f 1 2 \\ \t\r\n3 \\\n4\n");
+  EXPECT_EQ(blanks.triangles.size(), 2u);
+  EXPECT_TRUE(comment.notes.empty() && blanks.notes.empty());
+}
+
+TEST_F(Variants, ObjNamesWhatItDoesNotRead) {
+  const std::string square = "v 0 0 0 1\nv 1 0 0\nv 1 1 0 # c\nv 0 1 0\n";
+  EXPECT_TRUE(import("a.obj", "o x\ng a b\ns off\n" + square + "f 1 2 3 4\n").notes.empty());
+  const Mesh unknown = import("a.obj", square + "f 1 2 3 4\nusemap x\nF 1 2 3\nusemap y\n");
+  EXPECT_TRUE(has_note(unknown, "lines that begin with F, usemap are not read"));
+  EXPECT_EQ(unknown.notes.size(), 1u);
+  const Mesh alpha = import("a.obj", "v 0 0 0 1 0 0 0.5\nv 1 0 0 1 0 0 0.5\nv 1 1 0 1 0 0 0.5\nf 1 2 3\n");
+  EXPECT_TRUE(has_note(alpha, "alpha of vertices"));
+  EXPECT_EQ(alpha.color(0).base_color, glm::vec3(1, 0, 0));
+  EXPECT_TRUE(has_note(import("a.obj", square + "usemtl moss\nf 1 2 3\n"), "taken as grey: moss"));
+  const Refusal points = refusal("a.obj", square + "p 1 2\n");
+  EXPECT_EQ(points.exit, lsp::Exit::kInvalid);
+  EXPECT_NE(points.message.find("noted: 1 lines, points"), points.message.npos) << points.message;
+}
+
+TEST_F(Variants, MtlNamesWhatItDoesNotRead) {
+  const auto notes_of = [&](const std::string& mtl) {
+    write("a.mtl", "newmtl m\nKd 1 0 0\n" + mtl);
+    const Mesh mesh = import("a.obj", "mtllib a.mtl # c\nv 0 0 0\nv 1 0 0\nv 1 1 0\nusemtl m # c\nf 1 2 3\n");
+    EXPECT_EQ(mesh.color(0).base_color, glm::vec3(1, 0, 0)) << mtl;
+    std::string notes;
+    for (const std::string& note : mesh.notes) notes += note + "\n";
+    return notes;
+  };
+  // What exporters write of a plain material.
+  EXPECT_EQ(notes_of("# c\nNs 250\nKa 1 1 1\nKs 0.5 0.5 0.5\nNi 1.45\nd 1\nTr 0\nillum 2\nTf 1 1 1\nPs 0\n"),
+            "");
+  for (const char* line : {"Ks 1 0.8 0.3", "Tf 0 1 0", "Pc 1", "aniso 0.5", "gloss 3"})
+    EXPECT_NE(notes_of(std::string(line) + "\n").find(std::string(line, 2)), std::string::npos) << line;
+  EXPECT_NE(notes_of("d -halo 1\n").find("-halo"), std::string::npos);
+  EXPECT_NE(notes_of("newmtl m\nKd 0 1 0\n").find("m is defined more than once"), std::string::npos);
+}
+
+TEST_F(Variants, WhatFollowsTheEndIsNoted) {
+  const std::string header =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+      "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+  const std::string body = "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+  EXPECT_TRUE(import("a.ply", header + body + "\n \n").notes.empty());
+  EXPECT_TRUE(
+      has_note(import("a.ply", header + body + "3 2 1 0\n"), "7 bytes after what the header declares"));
+  EXPECT_TRUE(has_note(import("a.ply", header + "0 0 0 9\n1 0 0 9\n0 1 0 9\n3 0 1 2\n"),
+                       "more values than the header declares"));
+  const std::string off = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+  EXPECT_TRUE(import("a.off", off + "# the end\n").notes.empty());
+  EXPECT_TRUE(has_note(import("a.off", off + "3 2 1 0\n"), "what follows the last face"));
+  EXPECT_TRUE(has_note(import("a.off", "STOFF\n3 1 0\n0 0 0 0 0\n1 0 0 1 0\n0 1 0 0 1\n3 0 1 2\n"),
+                       "texture coordinates"));
+  const std::string stl =
+      "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
+      "endsolid a\n";
+  EXPECT_TRUE(import("a.stl", stl).notes.empty());
+  EXPECT_TRUE(has_note(import("a.stl", stl + "color 1 0 0\n"), "lines that begin with color"));
+}
+
+TEST_F(Variants, APlyCloudIsRefusedAsOne) {
+  const Refusal cloud =
+      refusal("a.ply",
+              "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
+              "property float z\nend_header\n0 0 0\n1 0 0\n");
+  EXPECT_EQ(cloud.exit, lsp::Exit::kInvalid);
+  EXPECT_NE(cloud.message.find("2 vertices have no faces"), cloud.message.npos) << cloud.message;
+}
+
+TEST_F(Variants, PlyTexturesOfFacesBeforeTheirVertices) {
+  write("red.png", rgba_png(1, 1, {255, 0, 0, 255}));
+  const Mesh mesh = import("a.ply",
+                           "ply\nformat ascii 1.0\ncomment TextureFile red.png\nelement face 1\nproperty "
+                           "list uchar int vertex_indices\n"
+                           "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty "
+                           "float s\nproperty float t\n"
+                           "end_header\n3 0 1 2\n0 0 0 0 0\n1 0 0 1 0\n0 1 0 0 1\n");
+  EXPECT_EQ(mesh.color(0).base_color, glm::vec3(1, 0, 0));
+  EXPECT_TRUE(mesh.notes.empty());
+}
+
+TEST_F(Variants, StlColoursOfMagicsAndVisCam) {
+  const auto stl = [](const std::string& header, const std::vector<uint16_t>& attributes) {
+    std::string bytes = header;
+    bytes.resize(80, ' ');
+    append(bytes, uint32_t(attributes.size()));
+    for (const uint16_t attribute : attributes) {
+      for (const float value : {0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0}) append(bytes, float(value));
+      append(bytes, attribute);
+    }
+    return bytes;
+  };
+  const std::string green("COLOR=\0\xFF\0\xFF", 10);
+  const Mesh magics = import("a.stl", stl(green, {31, 0x8000}));
+  EXPECT_EQ(magics.color(0).base_color, glm::vec3(1, 0, 0));
+  EXPECT_EQ(magics.color(1).base_color, glm::vec3(0, 1, 0));
+  EXPECT_TRUE(magics.notes.empty());
+  const Mesh viscam = import("a.stl", stl("", {0x8000 | 31, 0x8000 | 31 << 10, 5}));
+  EXPECT_EQ(viscam.color(0).base_color, glm::vec3(0, 0, 1));
+  EXPECT_EQ(viscam.color(1).base_color, glm::vec3(1, 0, 0));
+  EXPECT_EQ(viscam.color(2).base_color, glm::vec3(1)) << "has none";
+  EXPECT_TRUE(has_note(viscam, "taken as colours"));
+  const Mesh other = import("a.stl", stl("", {7, 9}));
+  EXPECT_TRUE(other.colors.empty());
+  EXPECT_TRUE(has_note(other, "no colours known here"));
+}
+
 TEST_F(Variants, PlyNamesWhatItDoesNotRead) {
   const Mesh mesh =
       import("a.ply", ply("property float s\nproperty float t\n", "0 0",

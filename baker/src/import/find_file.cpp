@@ -43,10 +43,9 @@ fs::path find_file(const fs::path& folder, std::string name, bool& guessed) {
   if (is_file(folder / name)) return folder / name;
   std::replace(name.begin(), name.end(), '\\', '/');
   const fs::path beside = fs::path(name).filename();
-  for (const fs::path& path : {folder / name, folder / beside}) {
-    if (is_file(path)) return path;
-  }
+  if (is_file(folder / name)) return folder / name;
   guessed = true;
+  if (is_file(folder / beside)) return folder / beside;
   for (const fs::path& tail : {fs::path(name), beside}) {
     if (tail.is_absolute()) continue;
     if (fs::path found = in_any_case(folder, tail); !found.empty()) return found;

@@ -6,9 +6,9 @@
 
 namespace lsp {
 
-// The file that is meant by a name relative to `folder`: by that name, with backslashes for slashes, or
-// beside the mesh, as exporters write paths of their own machine. Then, with `guessed` true, the same in any
-// case, as it is found where file systems do not mind. Empty where there is none.
+// The file that is meant by a name relative to `folder`: by that name, or with backslashes for slashes. Then,
+// with `guessed` true, beside the mesh, as exporters write paths of their own machine, and in any case, as it
+// is found where file systems do not mind. Empty where there is none.
 std::filesystem::path find_file(const std::filesystem::path& folder, std::string name, bool& guessed);
 
 }  // namespace lsp

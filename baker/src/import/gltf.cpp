@@ -127,6 +127,13 @@ class GltfReader {
       }
       add(all, extents_[size_t(root)]);
     }
+    size_t left_out = 0;
+    for (size_t node = 0; node < state.size(); ++node)
+      left_out += state[node] == kNew && model_.nodes[node].mesh >= 0;
+    if (left_out) {
+      builder_.note(document_->file + ": " + std::to_string(left_out) +
+                    " nodes with meshes are in no scene that is read, they are left out");
+    }
     if (all.visits > kMaxVisits) {
       throw Failure(Exit::kLimit, document_->file, "places more than 2^24 nodes, split the scene");
     }

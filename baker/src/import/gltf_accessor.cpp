@@ -77,7 +77,7 @@ const uint8_t* checked(const GltfDocument& document, Bytes bytes, uint64_t offse
   const uint64_t room = bytes.size();
   if (count == 0) return bytes.data();
   if (offset > room || element > room - offset || count - 1 > (room - offset - element) / stride) {
-    fail(document, "has an accessor that reaches beyond its buffer");
+    fail(document, "is cut short or has an accessor that reaches beyond its buffer");
   }
   return bytes.data() + offset;
 }

@@ -1,5 +1,6 @@
 #include "import/gltf_document.h"
 
+#include <algorithm>
 #include <cstring>
 
 #include "import/gltf_reduce.h"
@@ -73,7 +74,19 @@ Container open_container(const std::string& file, std::string_view bytes, std::v
   return container;
 }
 
-json parse_json(const std::string& file, std::string_view text, Budget& budget) {
+json parse_or_fail(const std::string& file, const std::string& text) {
+  try {
+    return json::parse(text);
+  } catch (const json::parse_error& error) {
+    fail(file, "is not valid JSON at byte " + std::to_string(error.byte) + " of it");
+  } catch (const json::exception&) {  // a number beyond all bounds
+    fail(file, "is not valid JSON");
+  }
+}
+
+// Names that Windows programs have written in the code page of their country are no reason to refuse it.
+json parse_json(const std::string& file, std::string_view text, Budget& budget,
+                std::vector<std::string>& notes) {
   int depth = 0;
   uint64_t objects = 0, values = 0;
   bool in_string = false;
@@ -99,7 +112,13 @@ json parse_json(const std::string& file, std::string_view text, Budget& budget) 
   budget.charge(file, values, 96);
   budget.charge(file, text.size(), 2);
   json document = json::parse(text, nullptr, false);
-  if (document.is_discarded()) fail(file, "is not valid JSON");
+  if (document.is_discarded()) {
+    budget.charge(file, text.size());
+    const std::string repaired = valid_utf8(text);
+    if (repaired != text)
+      notes.push_back("its text is no valid UTF-8, question marks stand for what is none");
+    document = parse_or_fail(file, repaired);
+  }
   if (!document.is_object()) fail(file, "is not a glTF document");
   return document;
 }
@@ -150,11 +169,13 @@ void read_buffers(const std::filesystem::path& path, const json& document, Bytes
       out.buffers.push_back({});
       continue;
     }
+    // Writers count padding that they do not write; what reads beyond the end is refused where it reads.
     if (bytes.size() < bytes_wanted) {
-      fail(out.file, "has buffer " + std::to_string(i) + " declared with " + std::to_string(bytes_wanted) +
-                         " bytes and holding " + std::to_string(bytes.size()));
+      out.notes.push_back("buffer " + std::to_string(i) + " is declared with " +
+                          std::to_string(bytes_wanted) + " bytes and holds " + std::to_string(bytes.size()) +
+                          ", it is read as it is");
     }
-    out.buffers.push_back(bytes.first(bytes_wanted));
+    out.buffers.push_back(bytes.first(std::min<uint64_t>(bytes_wanted, bytes.size())));
   }
 }
 
@@ -175,7 +196,7 @@ std::unique_ptr<GltfDocument> read_gltf_document(const std::filesystem::path& pa
   if (bytes.size() < 20) fail(out->file, "is too short for a glTF document");
   std::string reduced;
   {
-    json document = parse_json(out->file, container.text, budget);
+    json document = parse_json(out->file, container.text, budget, out->notes);
     check_version(out->file, document);
     check_required_extensions(out->file, document);
     for (std::string& part : unread_parts(document)) out->notes.push_back(std::move(part));

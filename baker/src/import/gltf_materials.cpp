@@ -1,5 +1,7 @@
 #include "import/gltf_materials.h"
 
+#include <algorithm>
+
 #include "import/json_member.h"
 #include "import/source_file.h"
 #include "import/uri.h"
@@ -66,8 +68,14 @@ GltfMaterials::Entry GltfMaterials::read(const json& source, uint32_t known_id) 
     base = &member(glossy, "diffuseTexture");
     material.roughness = 1.0f - float(number_member(glossy, "glossinessFactor", 1));
     material.metallic = 0;
+    float specular[3] = {1, 1, 1};
+    numbers_member(glossy, "specularFactor", 3, specular);
+    if (std::any_of(std::begin(specular), std::end(specular), [](float x) { return x != 0; }))
+      note(
+          "specular factors of KHR_materials_pbrSpecularGlossiness are not read, its materials are no "
+          "metals");
     if (!member(glossy, "specularGlossinessTexture").is_null())
-      note("specular-glossiness textures are not read, their factors hold");
+      note("specular-glossiness textures are not read, the glossiness factor holds");
   } else {
     mean_roughness(member(pbr, "metallicRoughnessTexture"), material);
   }
@@ -104,8 +112,8 @@ void GltfMaterials::note_unread_textures(const json& source) {
 // blue.
 void GltfMaterials::mean_roughness(const json& info, Material& material) {
   if (info.is_null()) return;
-  const json& texture = element(member(document_.looks, "textures"), index_member(info, "index"));
-  const int64_t image = image_of(texture);
+  const int64_t image = image_at(info);
+  if (image < 0) return;
   const auto [at, fresh] = roughness_.try_emplace(image, -1.0);
   if (fresh) {
     const Picture picture = read_picture(image);
@@ -121,11 +129,28 @@ void GltfMaterials::mean_roughness(const json& info, Material& material) {
   note("metallic-roughness textures are taken as their mean");
 }
 
+// The picture of the texture that a material names; -1, with a note, where there is none that is read.
+int64_t GltfMaterials::image_at(const json& info) {
+  const int64_t index = index_member(info, "index");
+  const json& texture = element(member(document_.looks, "textures"), index);
+  const int64_t image = image_of(texture);
+  if (index < 0) {
+    note("a texture without a number is not read; factors hold without it");
+  } else if (texture.is_null()) {
+    note("texture " + std::to_string(index) + " is not there; factors hold without it");
+  } else if (image < 0) {
+    note("texture " + std::to_string(index) + " names no picture that is read; factors hold without it");
+  }
+  return image;
+}
+
 TextureUse GltfMaterials::texture(const json& info, const AlphaRule& rule) {
   TextureUse use;
   if (info.is_null()) return use;
   const json& source = element(member(document_.looks, "textures"), index_member(info, "index"));
-  use.texture = picture(image_of(source), rule);
+  const int64_t image = image_at(info);
+  if (image < 0) return use;
+  use.texture = picture(image, rule);
   const json& sampler = element(member(document_.looks, "samplers"), index_member(source, "sampler"));
   use.wrap_x = wrap_of(sampler, "wrapS");
   use.wrap_y = wrap_of(sampler, "wrapT");

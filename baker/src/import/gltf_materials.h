@@ -32,6 +32,7 @@ class GltfMaterials {
  private:
   Entry read(const nlohmann::json& source, uint32_t known_id);
   TextureUse texture(const nlohmann::json& info, const AlphaRule& rule);
+  int64_t image_at(const nlohmann::json& info);
   std::shared_ptr<Texture> picture(int64_t image, const AlphaRule& rule);
   Picture read_picture(int64_t image);
   std::string picture_bytes(const nlohmann::json& image);

@@ -64,6 +64,13 @@ void drop_unused(GltfPrimitive& primitive) {
   gather(primitive.weights, primitive.joints_each);
 }
 
+// The number of an attribute in Draco's data, -1 where it is not in there.
+int draco_id(const tinygltf::Value& extension, const std::string& name) {
+  if (!extension.IsObject() || !extension.Get("attributes").IsObject()) return -1;
+  const tinygltf::Value& value = extension.Get("attributes").Get(name);
+  return value.IsInt() ? value.Get<int>() : -1;
+}
+
 }  // namespace
 
 GltfPrimitives::GltfPrimitives(const GltfDocument& document, GltfAccessors& accessors,
@@ -169,7 +176,8 @@ GltfPrimitives::Values GltfPrimitives::read_values(const tinygltf::Primitive& so
   if (decoded != decoded_.end() && decoded->second.values.contains(name)) {
     out.floats = decoded->second.values.at(name);
     accessors_.overlay_sparse(accessors_.at(found->second), out.components, out.floats);
-  } else if (decoded == decoded_.end() || accessors_.at(found->second).bufferView >= 0) {
+  } else if (decoded == decoded_.end() || accessors_.at(found->second).bufferView >= 0 ||
+             draco_id(source.extensions.at("KHR_draco_mesh_compression"), name) < 0) {
     out.floats = accessors_.floats(found->second, out.components);
   }
   return out;
@@ -203,6 +211,11 @@ void GltfPrimitives::read_colors(const tinygltf::Primitive& source, const std::v
   const Values colors = values_of("COLOR_0");
   const bool colored =
       std::any_of(colors.floats.begin(), colors.floats.end(), [](float x) { return x != 1; });
+  // What morph targets add up to is cut by the specification.
+  const bool beyond =
+      std::any_of(colors.floats.begin(), colors.floats.end(), [](float x) { return !(x >= 0 && x <= 1); });
+  if (beyond && weights.empty())
+    builder_.note(document_.file + ": vertex colours are cut to the range from 0 to 1");
   const Surface& surface = entry.surface;
   if (!surface.has_textures() && !colored) return;
   const auto coordinates = [&](const TextureUse& use) {
@@ -241,6 +254,10 @@ void GltfPrimitives::read_joints(const tinygltf::Primitive& source, GltfPrimitiv
     const std::string number = std::to_string(set);
     Values joint = read_values(source, "JOINTS_" + number, 4),
            weight = read_values(source, "WEIGHTS_" + number, 4);
+    if (joint.floats.empty() != weight.floats.empty())
+      builder_.note(document_.file +
+                    ": a primitive has joints without weights or weights without joints, set " + number +
+                    " of them is not read");
     if (joint.floats.empty() || weight.floats.empty()) break;
     if (joint.floats.size() != 4 * out.positions.size() || weight.floats.size() != joint.floats.size())
       fail("has more or fewer joints or weights than positions");
@@ -298,11 +315,7 @@ void GltfPrimitives::decode_all_draco() {
 
 DracoJob GltfPrimitives::draco_job(const tinygltf::Primitive& source, std::vector<std::string>& names) {
   const tinygltf::Value& extension = source.extensions.at("KHR_draco_mesh_compression");
-  const auto id = [&](const std::string& name) {
-    if (!extension.IsObject() || !extension.Get("attributes").IsObject()) return -1;
-    const tinygltf::Value& value = extension.Get("attributes").Get(name);
-    return value.IsInt() ? value.Get<int>() : -1;
-  };
+  const auto id = [&](const std::string& name) { return draco_id(extension, name); };
   const tinygltf::Value none;
   const tinygltf::Value& view = extension.IsObject() ? extension.Get("bufferView") : none;
   if (!view.IsInt() || id("POSITION") < 0)

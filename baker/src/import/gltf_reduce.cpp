@@ -221,6 +221,8 @@ std::vector<std::string> unread_parts(const json& document) {
     parts.push_back("the attribute " + name + " of instances is not read");
   if (member(document, "scenes").size() > 1 && !member(document, "scene").is_null()) {
     parts.push_back("only the default one of its scenes is read");
+  } else if (member(document, "scenes").size() > 1) {
+    parts.push_back("none of its scenes is the default one, all are read at once");
   }
   return parts;
 }

@@ -47,9 +47,16 @@ void check_pose(const PoseRequest& pose) {
 }
 
 void refuse_input(const std::filesystem::path& path, uint64_t count, const Rejected& before,
-                  const Rejected& after) {
-  if (count == 0)
-    throw Failure(Exit::kInvalid, path.string(), "holds no triangle, give a file with a mesh in it");
+                  const Rejected& after, std::span<const std::string> notes) {
+  if (count == 0) {
+    std::string noted;
+    const std::string prefix = path.string() + ": ";
+    for (const std::string& note : notes.first(std::min<size_t>(notes.size(), 3)))
+      noted +=
+          (noted.empty() ? " (noted: " : "; ") + note.substr(note.starts_with(prefix) ? prefix.size() : 0);
+    throw Failure(Exit::kInvalid, path.string(),
+                  "holds no triangle, give a file with a mesh in it" + noted + (noted.empty() ? "" : ")"));
+  }
   const std::string why = "none of its " + std::to_string(count) + " triangles can be used (" +
                           std::to_string(after.degenerate - before.degenerate) + " degenerate, " +
                           std::to_string(after.non_finite - before.non_finite) + " not finite, " +
@@ -67,6 +74,7 @@ Mesh import_meshes(std::span<const std::filesystem::path> inputs, const ImportOp
     builder.begin_input(path);
     const uint64_t count_before = builder.mesh().primitive_count;
     const Rejected before = builder.mesh().rejected;
+    const size_t noted = builder.mesh().notes.size();
     try {
       read_mesh_file(path, builder, pose);
     } catch (const std::bad_alloc&) {
@@ -75,7 +83,8 @@ Mesh import_meshes(std::span<const std::filesystem::path> inputs, const ImportOp
     budget.settle(builder.allocated_bytes());
     const uint64_t count = builder.mesh().primitive_count - count_before;
     const Rejected& rejected = builder.mesh().rejected;
-    if (count == rejected.total() - before.total()) refuse_input(path, count, before, rejected);
+    if (count == rejected.total() - before.total())
+      refuse_input(path, count, before, rejected, std::span(builder.mesh().notes).subspan(noted));
   }
   check_pose(pose);
   return builder.take();

@@ -73,7 +73,7 @@ InstancedMeshes import_instances(std::span<const std::filesystem::path> inputs,
     scene.sources.push_back({path});
     const uint64_t count_before = scene.primitive_count;
     const Rejected before = scene.rejected;
-    const size_t first = scene.assets.size();
+    const size_t first = scene.assets.size(), noted = scene.notes.size();
     try {
       read_input(path, builder, pose, scene);
     } catch (const std::bad_alloc&) {
@@ -81,7 +81,8 @@ InstancedMeshes import_instances(std::span<const std::filesystem::path> inputs,
     }
     budget.settle(scene.allocated_bytes);
     if (scene.assets.size() == first)
-      refuse_input(path, scene.primitive_count - count_before, before, scene.rejected);
+      refuse_input(path, scene.primitive_count - count_before, before, scene.rejected,
+                   std::span(scene.notes).subspan(noted));
   }
   check_pose(pose);
   for (InstancedAsset& asset : scene.assets) asset.mesh.sources = {scene.sources[asset.input]};

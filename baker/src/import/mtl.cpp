@@ -1,5 +1,6 @@
 #include "import/mtl.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "import/source_file.h"
@@ -21,10 +22,13 @@ bool read_color(std::string_view line, glm::vec3& color) {
   return true;
 }
 
-bool read_factor(std::string_view line, float& factor) {
+bool read_factor(std::string_view line, float& factor, std::set<std::string>& notes) {
   std::string_view word;
   if (!take_word(line, word)) return false;
-  if (word == "-halo" && !take_word(line, word)) return false;
+  if (word == "-halo") {
+    notes.insert("the option -halo of d is not read");
+    if (!take_word(line, word)) return false;
+  }
   const double value = number_of(word);
   if (std::isfinite(value)) factor = float(value);
   return std::isfinite(value);
@@ -76,6 +80,25 @@ MtlMap* map_by(std::string_view word, MtlMaterial& entry) {
                                                 : nullptr;
 }
 
+// Statements that no diffuse light depends on, or that lost to another (Tr, Ns).
+bool says_no_color(std::string_view word) {
+  constexpr std::string_view kWords[] = {"Ka", "Ni", "illum", "sharpness", "Pcr", "anisor", "Tr", "Ns"};
+  return word.starts_with('#') || std::any_of(std::begin(kWords), std::end(kWords), [&](std::string_view w) {
+           return equals_ignoring_case(w, word);
+         });
+}
+
+// Whether a statement has another value than the one that exporters write where there is nothing to say: for
+// Ks a grey of at most 0.5, which is what any varnish reflects.
+bool says_something(std::string_view word, std::string_view line) {
+  const auto is = [&](std::string_view keyword) { return equals_ignoring_case(word, keyword); };
+  glm::vec3 value(0);
+  if (!read_color(line, value)) return true;
+  if (is("Ks")) return value.x > 0.5f || value.y != value.x || value.z != value.x;
+  if (is("Tf")) return value != glm::vec3(1);
+  return !(is("Ps") || is("Pc") || is("aniso")) || value != glm::vec3(0);
+}
+
 }  // namespace
 
 void read_mtl(const std::filesystem::path& path, Budget& budget,
@@ -97,6 +120,9 @@ void read_mtl(const std::filesystem::path& path, Budget& budget,
       budget.charge(path.string(), sizeof(MtlMaterial) + 64 + 2 * name.size());
       const auto [at, fresh] = materials.try_emplace(name, MtlMaterial{});
       entry = fresh ? &at->second : &unnamed;
+      if (!fresh)
+        notes.insert("the material " + name.substr(0, 100) +
+                     " is defined more than once, its first definition holds");
       entry->material.name = name;
       rough_given = solid_given = color_given = emission_given = false;
       continue;
@@ -108,17 +134,17 @@ void read_mtl(const std::filesystem::path& path, Budget& budget,
       (glow ? emission_given : color_given) = true;
       if (!read_color(line, glow ? material.emission : material.base_color))
         notes.insert("a " + std::string(word) + " that is no three numbers is not read");
-    } else if (is("d") && read_factor(line, factor)) {
+    } else if (is("d") && read_factor(line, factor, notes)) {
       material.opacity = factor;
       solid_given = true;
-    } else if (is("Tr") && !solid_given && read_factor(line, factor)) {
+    } else if (is("Tr") && !solid_given && read_factor(line, factor, notes)) {
       material.opacity = 1.0f - factor;
-    } else if (is("Pr") && read_factor(line, factor)) {
+    } else if (is("Pr") && read_factor(line, factor, notes)) {
       material.roughness = factor;
       rough_given = true;
-    } else if (is("Pm") && read_factor(line, factor)) {
+    } else if (is("Pm") && read_factor(line, factor, notes)) {
       material.metallic = factor;
-    } else if (is("Ns") && !rough_given && read_factor(line, factor) && factor >= 0) {
+    } else if (is("Ns") && !rough_given && read_factor(line, factor, notes) && factor >= 0) {
       material.roughness = std::sqrt(2.0f / (factor + 2.0f));  // the Beckmann width of a Phong lobe
     } else if (MtlMap* map = map_by(word, *entry)) {
       budget.charge(path.string(), 2 * line.size() + 64);
@@ -126,6 +152,9 @@ void read_mtl(const std::filesystem::path& path, Budget& budget,
     } else if (equals_ignoring_case(word.substr(0, 4), "map_") || word == "bump" || word == "norm" ||
                word == "disp" || word == "decal" || word == "refl") {
       notes.insert(std::string(word) + " is not read");
+    } else if (!says_no_color(word) && says_something(word, line)) {
+      constexpr size_t kLongest = 32, kMostNotes = 100;
+      if (notes.size() < kMostNotes) notes.insert(std::string(word.substr(0, kLongest)) + " is not read");
     }
   }
   end_material();

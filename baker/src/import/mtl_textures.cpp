@@ -93,7 +93,13 @@ Picture MtlTextures::read(const MtlMaterial& source, const MtlMap& map) {
   if (map.file.empty()) return picture;
   std::string why = "is not there";
   bool guessed = false;
-  if (const auto path = find_file(source.folder, map.file, guessed); !path.empty()) {
+  std::filesystem::path path = find_file(source.folder, map.file, guessed);
+  if (const auto folder = std::filesystem::path(file_).parent_path();
+      path.empty() && folder != source.folder) {
+    path = find_file(folder, map.file, guessed);  // some exporters name what lies beside the mesh
+    guessed = true;
+  }
+  if (!path.empty()) {
     if (guessed) builder_.note(file_ + ": the picture " + map.file + " is read from " + path.string());
     const std::string bytes = read_file(path, builder_.budget());
     builder_.add_source(path);

@@ -30,13 +30,13 @@ class ObjReader {
     std::string_view rest = text, line;
     std::string joined;
     while (take_line(rest, line)) {
-      if (!line.empty() && line.back() == '\\') {
+      if (goes_on(line) && !is_comment(line)) {
         joined.clear();
         do {
-          joined.append(line.substr(0, line.size() - 1));
+          joined.append(line.substr(0, line.rfind('\\')));
           joined += ' ';
-        } while (take_line(rest, line) && !line.empty() && line.back() == '\\');
-        if (line.empty() || line.back() != '\\') joined.append(line);
+        } while (take_line(rest, line) && goes_on(line));
+        if (!goes_on(line)) joined.append(line);
         line = joined;
       }
       read_line(line);
@@ -45,6 +45,7 @@ class ObjReader {
       throw Failure(Exit::kLimit, file_, "holds more than 2^32 - 2 vertices, split the mesh");
     }
     resolve_materials();
+    note_unread();
     if (other_elements_) {
       builder_.note(file_ + ": " + std::to_string(other_elements_) +
                     " lines, points, curves or surfaces hold no triangle");
@@ -55,6 +56,11 @@ class ObjReader {
   }
 
  private:
+  // Blanks behind the backslash are a slip that exporters' wrapping makes.
+  static bool goes_on(std::string_view line) { return trim(line).ends_with('\\'); }
+  // One may end in a backslash, as folders' names do, and never goes on.
+  static bool is_comment(std::string_view line) { return trim(line).starts_with('#'); }
+
   void read_line(std::string_view line) {
     std::string_view word;
     if (!take_word(line, word)) return;
@@ -77,7 +83,19 @@ class ObjReader {
       read_polypaint(line);
     } else if (word == "l" || word == "p" || word == "curv" || word == "curv2" || word == "surf") {
       ++other_elements_;
+    } else if (!word.starts_with('#') && !says_no_surface(word)) {
+      constexpr size_t kMostWords = 8, kLongest = 32;
+      if (unknown_words_.size() < kMostWords) unknown_words_.emplace(printable(word.substr(0, kLongest)));
     }
+  }
+
+  // Names, groups and what curves and surfaces, which are counted, are made of.
+  static bool says_no_surface(std::string_view word) {
+    constexpr std::string_view kWords[] = {
+        "o",      "g",    "s",        "mg",       "vp",         "deg",       "bmat",  "step",
+        "cstype", "parm", "trim",     "hole",     "scrv",       "sp",        "end",   "con",
+        "bevel",  "lod",  "c_interp", "d_interp", "shadow_obj", "trace_obj", "ctech", "stech"};
+    return std::find(std::begin(kWords), std::end(kWords), word) != std::end(kWords);
   }
 
   template <typename T>
@@ -107,7 +125,11 @@ class ObjReader {
     glm::vec3 color(1);
     std::string_view word;
     int count = 0;
-    for (; count < 3 && take_word(line, word); ++count) color[count] = float(number_of(word));
+    const auto take_value = [&] { return take_word(line, word) && word.front() != '#'; };
+    for (; count < 3 && take_value(); ++count) color[count] = float(number_of(word));
+    // A weight, which polygons do not have, or an alpha: 1 says nothing.
+    values_left_ = values_left_ || count == 2 || (count == 1 && color.x != 1);
+    if (count == 3 && take_value()) values_left_ = values_left_ || number_of(word) != 1;
     const bool given = count == 3 && std::isfinite(color.x + color.y + color.z);
     if (!given && soup_.colors.empty()) return;
     while (soup_.colors.size() + 1 < soup_.positions.size()) push(soup_.colors, kNoColor);
@@ -126,6 +148,13 @@ class ObjReader {
       push(polypaint_, glm::vec3(mrgb >> 16 & 255, mrgb >> 8 & 255, mrgb & 255) / 255.0f);
     }
     bad_polypaint_ = bad_polypaint_ || !line.empty();
+  }
+
+  void note_unread() {
+    std::string words;
+    for (const std::string& word : unknown_words_) words += (words.empty() ? "" : ", ") + word;
+    if (!words.empty()) builder_.note(file_ + ": lines that begin with " + words + " are not read");
+    if (values_left_) builder_.note(file_ + ": weights and alpha of vertices are not read");
   }
 
   // Colours that stand with the vertices themselves win.
@@ -204,7 +233,7 @@ class ObjReader {
   void read_libraries(const std::string& words, std::map<std::string, MtlMaterial>& materials) {
     if (words.empty() || try_library(std::string(unquoted(words)), materials)) return;
     std::string_view rest = words, word;
-    while (take_word(rest, word)) {
+    while (take_word(rest, word) && !word.starts_with('#')) {
       if (!try_library(std::string(unquoted(word)), materials)) {
         builder_.note(file_ + ": the material library " + std::string(word) + " is not there");
       }
@@ -220,14 +249,21 @@ class ObjReader {
     }
     std::vector<uint32_t> ids(used_.size(), kNoIndex);
     uint64_t missing = 0;
+    std::string missing_names;
     for (uint32_t& material : soup_.materials) {
       uint32_t& id = ids[material];
       if (id == kNoIndex) {
         const std::string& name = used_[material];
-        const auto found = defined.find(name);
+        auto found = defined.find(name);
+        if (found == defined.end())  // a comment may stand behind it, but names hold '#', too
+          found = defined.find(std::string(trim(std::string_view(name).substr(0, name.find(" #")))));
         Material fallback;
         fallback.name = name;
-        if (found == defined.end() && !name.empty()) ++missing;
+        if (found == defined.end() && !name.empty()) {
+          constexpr size_t kLongest = 200;
+          if (missing_names.size() < kLongest)
+            missing_names += (missing++ ? ", " : "") + name.substr(0, kLongest);
+        }
         id = name.empty() && found == defined.end() ? builder_.default_material()
              : found == defined.end()               ? builder_.add_material(fallback)
                                                     : textures_.add(found->second, soup_.surfaces);
@@ -235,8 +271,8 @@ class ObjReader {
       material = id;
     }
     if (missing) {
-      builder_.note(file_ + ": " + std::to_string(missing) +
-                    " materials are named but not defined, they are taken as grey");
+      builder_.note(file_ +
+                    ": materials are named but not defined, they are taken as grey: " + missing_names);
     }
   }
 
@@ -252,6 +288,8 @@ class ObjReader {
   std::vector<std::string> libraries_;
   size_t libraries_tried_ = 0;
   uint64_t other_elements_ = 0;
+  std::set<std::string> unknown_words_;
+  bool values_left_ = false;          // behind the coordinates or colours of vertices
   std::vector<glm::vec3> polypaint_;  // of #MRGB lines, by vertex
   bool bad_polypaint_ = false;
 };

@@ -59,7 +59,7 @@ class OffReader {
     }
     for (uint64_t i = 0; i < vertex_count; ++i) read_vertex();
     for (uint64_t i = 0; i < face_count; ++i) read_face();
-    if (unread_) builder_.note(file_ + ": colours by number, alpha or texture coordinates are not read");
+    note_unread();
     if (!colored_) soup_.face_colors.clear();
     soup_.make_colors_linear();
     soup_.material = builder_.default_material();
@@ -67,6 +67,16 @@ class OffReader {
   }
 
  private:
+  void note_unread() {
+    if (vertex_values_left_)
+      builder_.note(file_ + ": texture coordinates or other values behind those of vertices are not read");
+    if (face_values_left_)
+      builder_.note(file_ + ": colours of faces by their number in a table are not read");
+    if (translucent_) builder_.note(file_ + ": alpha of vertices or faces is not read, all count as solid");
+    std::string_view word;
+    if (words_.next(word)) builder_.note(file_ + ": what follows the last face is not read");
+  }
+
   template <typename T>
   void push(std::vector<T>& vector, const T& value) {
     builder_.budget().push_back(file_, vector, value);
@@ -140,7 +150,7 @@ class OffReader {
       while (soup_.colors.size() + 1 < soup_.positions.size()) push(soup_.colors, kNoColor);
       push(soup_.colors, color);
     }
-    unread_ = words_.skip_line() || unread_;
+    vertex_values_left_ = words_.skip_line() || vertex_values_left_;
   }
 
   // Three numbers; what follows them is left. False, with nothing read, where there are not three.
@@ -159,7 +169,7 @@ class OffReader {
     if (words_.line_goes_on()) {
       words_.next(alpha);
       const double value = number_of(alpha);
-      unread_ = unread_ || (value != 255 && value != 1);
+      translucent_ = translucent_ || (value != 255 && value != 1);
     }
     return true;
   }
@@ -175,7 +185,7 @@ class OffReader {
     }
     glm::vec3 color = kNoColor;
     colored_ = read_color(color) || colored_;
-    unread_ = words_.skip_line() || unread_;
+    face_values_left_ = words_.skip_line() || face_values_left_;
     if (soup_.end_face(file_, builder_.budget())) push(soup_.face_colors, color);
   }
 
@@ -188,7 +198,7 @@ class OffReader {
   bool homogeneous_ = false;
   bool has_colors_ = false;
   bool colored_ = false;  // some face is
-  bool unread_ = false;
+  bool vertex_values_left_ = false, face_values_left_ = false, translucent_ = false;
 };
 
 }  // namespace

@@ -2,8 +2,10 @@
 
 #include <webp/decode.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <memory>
+#include <utility>
 
 namespace {
 
@@ -58,6 +60,89 @@ Picture decode_webp(const std::string& file, std::string_view bytes, Budget& bud
   return picture;
 }
 
+// What a JPEG's markers say.
+struct JpegFrame {
+  size_t begin = 0;  // behind the marker of its start; 0: it is no JPEG
+  int components = 0;
+  bool adobe = false;  // a marker of Adobe's says what they are
+  bool usable = true;  // no table has more codes than a byte can count
+};
+
+// Whether the tables of codes in `length` bytes have at most 256 each: stb_image 2.27 writes what is beyond
+// over what lies behind them. It reads a table to its end, even where the length ends before.
+bool usable_tables(std::string_view rest, int64_t length) {
+  constexpr size_t kCounts = 16;
+  while (length > 0) {
+    size_t codes = 0;
+    for (size_t i = 1; i <= kCounts && i < rest.size(); ++i) codes += uint8_t(rest[i]);
+    if (codes > 256) return false;
+    rest.remove_prefix(std::min(rest.size(), 1 + kCounts + codes));
+    length -= int64_t(1 + kCounts + codes);
+  }
+  return true;
+}
+
+// Follows markers as stb_image does: from one to the next by its length, and, where none is or coded data
+// follow, to the next one that is neither a zero nor a restart.
+JpegFrame jpeg_frame(std::string_view bytes) {
+  JpegFrame frame;
+  const size_t start = bytes.find_first_not_of('\xFF');
+  if (start == 0 || start == bytes.npos || bytes[start] != '\xD8') return frame;
+  frame.begin = start + 1;
+  for (size_t at = frame.begin; at + 4 <= bytes.size();) {
+    const auto marker = uint8_t(bytes[at + 1]);
+    const bool is_restart = marker >= 0xD0 && marker <= 0xD7;
+    if (uint8_t(bytes[at]) != 0xFF || marker == 0xFF || marker == 0 || is_restart) {
+      ++at;
+      continue;
+    }
+    if (marker == 0xD9) break;
+    const size_t length = size_t{uint8_t(bytes[at + 2])} * 256 + uint8_t(bytes[at + 3]);
+    const std::string_view rest = bytes.substr(at + 4);
+    if (marker >= 0xC0 && marker <= 0xC2 && rest.size() > 5) frame.components = uint8_t(rest[5]);
+    if (marker == 0xEE && rest.starts_with("Adobe")) frame.adobe = true;
+    if (marker == 0xC4 && !usable_tables(rest, int64_t(length) - 2)) frame.usable = false;
+    at += 2 + length;
+  }
+  return frame;
+}
+
+// stb_image takes four components without Adobe's marker for luma and chroma; they are CMYK, and programs
+// that show them take them to be as Adobe's.
+std::string with_adobe_marker(std::string_view jpeg, size_t begin) {
+  constexpr std::string_view kMarker(
+      "\xFF\xEE\0\x0E"
+      "Adobe\0\x64\0\0\0\0\0",
+      16);
+  return std::string(jpeg.substr(0, begin)).append(kMarker).append(jpeg.substr(begin));
+}
+
+// Formats that people's exporters write and that are not read, by how they begin.
+const char* foreign_format(std::string_view bytes) {
+  constexpr std::pair<std::string_view, const char*> kFormats[] = {{"\xABKTX 20", "KTX2"},
+                                                                   {"\xABKTX 11", "KTX"},
+                                                                   {"DDS ", "DDS"},
+                                                                   {"II*", "TIFF"},
+                                                                   {"MM", "TIFF"},
+                                                                   {"GIF8", "GIF"},
+                                                                   {"8BPS", "a Photoshop document"},
+                                                                   {"v/1\x01", "OpenEXR"},
+                                                                   {"#?", "Radiance HDR"},
+                                                                   {"\xFF\x0A", "JPEG XL"},
+                                                                   {"<s", "SVG"},
+                                                                   {"<?", "XML"},
+                                                                   {"<!", "HTML"},
+                                                                   {"<h", "HTML"}};
+  for (const auto& [start, name] : kFormats) {
+    if (bytes.starts_with(start)) return name;
+  }
+  const std::string_view after_length = bytes.substr(std::min<size_t>(bytes.size(), 4));
+  return after_length.starts_with("ftypavif") ? "AVIF"
+         : after_length.starts_with("JXL ")   ? "JPEG XL"
+         : after_length.starts_with("jP  ")   ? "JPEG 2000"
+                                              : nullptr;
+}
+
 Picture decode_stb(const std::string& file, std::string_view bytes, Budget& budget, std::string& why) {
   const auto* data = reinterpret_cast<const stbi_uc*>(bytes.data());
   int width = 0, height = 0, channels = 0;
@@ -93,9 +178,23 @@ Picture decode_stb(const std::string& file, std::string_view bytes, Budget& budg
 }  // namespace
 
 Picture decode_picture(const std::string& file, std::string_view bytes, Budget& budget, std::string& why) {
-  if (bytes.substr(0, 7) == "\xABKTX 20") {
-    why = "is KTX2, which is not read";
+  if (bytes.empty()) {
+    why = "is empty";
     return {};
+  }
+  if (const char* foreign = foreign_format(bytes)) {
+    why = std::string("is ") + foreign + ", which is not read";
+    return {};
+  }
+  const JpegFrame frame = jpeg_frame(bytes);
+  if (!frame.usable) {
+    why = "is damaged";
+    return {};
+  }
+  std::string marked;
+  if (frame.begin && frame.components == 4 && !frame.adobe) {
+    budget.charge(file, bytes.size());
+    bytes = marked = with_adobe_marker(bytes, frame.begin);
   }
   const bool webp = bytes.substr(0, 4) == "RIFF" && bytes.size() > 12 && bytes.substr(8, 4) == "WEBP";
   Picture picture = webp ? decode_webp(file, bytes, budget, why) : decode_stb(file, bytes, budget, why);

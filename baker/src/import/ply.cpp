@@ -26,7 +26,9 @@ class PlyReader {
   void read(const Header& header) {
     textured_ = !header.textures.empty();
     for (const Element& element : header.elements) {
-      has_normals_ = has_normals_ || (element.name == "vertex" && holds_normals(element));
+      if (element.name != "vertex") continue;
+      has_normals_ = has_normals_ || holds_normals(element);
+      vertices_placed_ = vertices_placed_ || holds_texcoords(element);
     }
     for (const Element& element : header.elements) {
       check_size(element, header.encoding);
@@ -41,6 +43,7 @@ class PlyReader {
         if (element.count > 0) builder_.note(file_ + ": the element " + element.name + " is not read");
       }
     }
+    note_unread_bytes();
     if (translucent_) builder_.note(file_ + ": alpha of vertices or faces is not read, all count as solid");
     soup_.material = builder_.default_material();
     use_textures(header.textures);
@@ -56,6 +59,27 @@ class PlyReader {
         found += !property.is_list && equals_ignoring_case(property.name, name);
     }
     return found >= 3;
+  }
+
+  bool holds_texcoords(const Element& element) const {
+    bool held[2] = {};
+    for (const Property& property : element.properties) {
+      if (const int place = texcoord_of(property); place >= 0) held[place] = true;
+    }
+    return held[0] && held[1];
+  }
+
+  void note_unread_bytes() {
+    if (body_.passed_over())
+      builder_.note(file_ + ": lines hold more values than the header declares, they are not read");
+    if (const size_t bytes = body_.tail(); bytes > 0) {
+      builder_.note(file_ + ": " + std::to_string(bytes) +
+                    " bytes after what the header declares are not read");
+    }
+    if (soup_.face_ends.empty() && soup_.too_small == 0 && !soup_.positions.empty()) {
+      builder_.note(file_ + ": its " + std::to_string(soup_.positions.size()) +
+                    " vertices have no faces, they are a cloud of points");
+    }
   }
 
   // So that a header cannot make the reader loop for ages over nothing.
@@ -162,7 +186,7 @@ class PlyReader {
       targets.push_back(target);
     }
     note_unread(element, [&](size_t k) { return targets[k] >= 0; });
-    const bool placed = std::ranges::count(targets, 10) > 0 && std::ranges::count(targets, 11) > 0;
+    const bool placed = holds_texcoords(element);
     if (element.count > 0 && (seen & 7) != 7) fail(file_, "has vertices without x, y and z");
     if (element.count >= kNoIndex - soup_.positions.size()) {
       throw Failure(Exit::kLimit, file_, "holds more than 2^32 - 2 vertices, split the mesh");
@@ -188,7 +212,6 @@ class PlyReader {
       if (placed) {
         soup_.texcoords.resize(soup_.positions.size() - 1);
         soup_.texcoords.push_back(from_upper_left(values[10], values[11]));
-        vertices_placed_ = true;
       }
       if (!color.there()) continue;
       soup_.colors.resize(soup_.positions.size() - 1, kNoColor);

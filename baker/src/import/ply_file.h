@@ -103,8 +103,13 @@ class Body {
     if (encoding_ != Encoding::kAscii) return;
     size_t end = 0;
     while (end < bytes_.size() && !is_line_end(bytes_[end])) ++end;
+    passed_over_ = passed_over_ || !trim(bytes_.substr(0, end)).empty();
     bytes_.remove_prefix(end);
   }
+  // Whether lines held values that the header does not declare.
+  bool passed_over() const { return passed_over_; }
+  // Bytes that are not blank behind what was read.
+  size_t tail() const { return trim(bytes_).size(); }
 
   void skip(const Property& property) {
     const uint64_t count = property.is_list ? list_length(property) : 1;
@@ -161,6 +166,7 @@ class Body {
   const std::string& file_;
   std::string_view bytes_;
   const Encoding encoding_;
+  bool passed_over_ = false;
 };
 
 }  // namespace lsp::ply

@@ -42,8 +42,9 @@ bool is_gltf(const std::filesystem::path& path);
 void read_mesh_file(const std::filesystem::path& path, MeshBuilder& builder, PoseRequest& pose);
 // Throws Failure kUsage for a time that moves nothing: a mistake.
 void check_pose(const PoseRequest& pose);
-// Throws Failure kInvalid, saying why nothing can be made of the input's `count` triangles.
+// Throws Failure kInvalid, saying why nothing can be made of the input's `count` triangles; `notes` are those
+// that it led to.
 [[noreturn]] void refuse_input(const std::filesystem::path& path, uint64_t count, const Rejected& before,
-                               const Rejected& after);
+                               const Rejected& after, std::span<const std::string> notes);
 
 }  // namespace lsp

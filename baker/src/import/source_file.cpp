@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 
@@ -59,6 +60,26 @@ std::string utf8_of_utf16(std::string_view bytes, bool big_endian) {
   return out;
 }
 
+// How many bytes the UTF-8 character at `i` has; 0 where there is none. No overlong forms, no surrogates,
+// nothing beyond U+10FFFF.
+size_t utf8_length(std::string_view text, size_t i) {
+  const auto lead = uint8_t(text[i]);
+  const size_t length = lead < 0x80                   ? 1
+                        : lead >= 0xC2 && lead < 0xE0 ? 2
+                        : lead >= 0xE0 && lead < 0xF0 ? 3
+                        : lead >= 0xF0 && lead < 0xF5 ? 4
+                                                      : 0;
+  if (i + length > text.size()) return 0;
+  for (size_t k = 1; k < length; ++k) {
+    if ((uint8_t(text[i + k]) & 0xC0) != 0x80) return 0;
+  }
+  if (length < 3) return length;
+  const auto second = uint8_t(text[i + 1]);
+  const bool wrong = (lead == 0xE0 && second < 0xA0) || (lead == 0xED && second >= 0xA0) ||
+                     (lead == 0xF0 && second < 0x90) || (lead == 0xF4 && second >= 0x90);
+  return wrong ? 0 : length;
+}
+
 }  // namespace
 
 std::string read_file(const std::filesystem::path& path, Budget& budget) {
@@ -110,26 +131,21 @@ std::string printable(std::string_view text) {
   std::string out;
   out.reserve(text.size());
   for (size_t i = 0; i < text.size();) {
-    const auto lead = uint8_t(text[i]);
-    const size_t length = lead < 0x80                   ? 1
-                          : lead >= 0xC2 && lead < 0xE0 ? 2
-                          : lead >= 0xE0 && lead < 0xF0 ? 3
-                          : lead >= 0xF0 && lead < 0xF5 ? 4
-                                                        : 0;
-    bool good = length > 0 && i + length <= text.size() && (lead >= 0x20 && lead != 0x7F);
-    for (size_t k = 1; good && k < length; ++k) good = (uint8_t(text[i + k]) & 0xC0) == 0x80;
-    if (good && length > 2) {  // no overlong forms, no surrogates, nothing beyond U+10FFFF
-      const auto second = uint8_t(text[i + 1]);
-      good = !(lead == 0xE0 && second < 0xA0) && !(lead == 0xED && second >= 0xA0) &&
-             !(lead == 0xF0 && second < 0x90) && !(lead == 0xF4 && second >= 0x90);
-    }
-    if (good) {
-      out.append(text.substr(i, length));
-      i += length;
-    } else {
-      out += '?';
-      ++i;
-    }
+    const size_t length = utf8_length(text, i);
+    const bool control = uint8_t(text[i]) < 0x20 || text[i] == 0x7F;
+    out.append(length && !control ? text.substr(i, length) : "?");
+    i += std::max<size_t>(length, 1);
+  }
+  return out;
+}
+
+std::string valid_utf8(std::string_view text) {
+  std::string out;
+  out.reserve(text.size());
+  for (size_t i = 0; i < text.size();) {
+    const size_t length = utf8_length(text, i);
+    out.append(length ? text.substr(i, length) : "?");
+    i += std::max<size_t>(length, 1);
   }
   return out;
 }

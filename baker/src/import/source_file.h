@@ -19,4 +19,7 @@ std::string read_text(const std::filesystem::path& path, Budget& budget);
 // may go into reports.
 std::string printable(std::string_view text);
 
+// The text with a question mark for every byte that is no part of a UTF-8 character.
+std::string valid_utf8(std::string_view text);
+
 }  // namespace lsp

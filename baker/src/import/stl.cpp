@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <set>
 
 #include "import/polygons.h"
 #include "import/readers.h"
@@ -107,6 +108,46 @@ uint32_t count_triangles(const std::string& file, std::string_view bytes, MeshBu
   return uint32_t(declared);
 }
 
+// The two bytes behind a triangle, which some programs use for a colour of three times five bits. Magics says
+// so in the header, "COLOR=" and four bytes for the triangles whose highest bit is set, red lowest; VisCAM
+// and SolidView set that bit where there is a colour, blue lowest.
+glm::vec3 color_of(uint16_t attribute, bool magics, const glm::vec3& whole) {
+  const glm::vec3 fives(attribute & 31, attribute >> 5 & 31, attribute >> 10 & 31);
+  const bool highest = attribute >> 15;
+  if (magics) return highest ? whole : fives / 31.0f;
+  return highest ? glm::vec3(fives.z, fives.y, fives.x) / 31.0f : kNoColor;
+}
+
+void read_colors(const std::string& file, std::string_view bytes, uint32_t count, PolygonSoup& soup,
+                 MeshBuilder& builder) {
+  const auto attribute = [&](size_t i) {
+    uint16_t value = 0;
+    std::memcpy(&value, bytes.data() + kHeaderBytes + (i + 1) * kTriangleBytes - sizeof value, sizeof value);
+    return value;
+  };
+  constexpr std::string_view kColor = "COLOR=";
+  const size_t found = bytes.substr(0, 80).find(kColor);
+  const bool magics = found <= 80 - kColor.size() - 4;
+  bool any = false, colored = magics;
+  for (size_t i = 0; i < count; ++i) {
+    any = any || attribute(i) != 0;
+    colored = colored || attribute(i) >> 15;
+  }
+  if (!colored) {
+    if (any) builder.note(file + ": attribute bytes of triangles are no colours known here and are not read");
+    return;
+  }
+  uint8_t rgba[4] = {};
+  if (magics) std::memcpy(rgba, bytes.data() + found + kColor.size(), sizeof rgba);
+  if (magics && rgba[3] != 255) builder.note(file + ": the alpha of its colour is not read");
+  if (!magics)
+    builder.note(file +
+                 ": attribute bytes of triangles are taken as colours, as VisCAM and SolidView write them");
+  builder.budget().charge(file, count, sizeof(glm::vec3));
+  for (size_t i = 0; i < count; ++i)
+    soup.face_colors.push_back(color_of(attribute(i), magics, glm::vec3(rgba[0], rgba[1], rgba[2]) / 255.0f));
+}
+
 void read_binary(const std::string& file, std::string_view bytes, uint32_t count, PolygonSoup& soup,
                  MeshBuilder& builder) {
   constexpr uint64_t kSoupBytes = sizeof(glm::vec3) + 3 * sizeof(glm::dvec3) + 7 * sizeof(uint32_t);
@@ -116,7 +157,6 @@ void read_binary(const std::string& file, std::string_view bytes, uint32_t count
   soup.corner_normals.reserve(size_t{3} * count);
   soup.normals.reserve(count);
   soup.face_ends.reserve(count);
-  bool attributes = false;
   for (size_t i = 0; i < count; ++i) {
     glm::vec3 vectors[4];
     std::memcpy(vectors, bytes.data() + kHeaderBytes + i * kTriangleBytes, sizeof vectors);
@@ -127,11 +167,9 @@ void read_binary(const std::string& file, std::string_view bytes, uint32_t count
     }
     soup.normals.push_back(vectors[0]);
     soup.end_face(file, builder.budget());
-    const char* attribute = bytes.data() + kHeaderBytes + i * kTriangleBytes + sizeof vectors;
-    attributes = attributes || attribute[0] || attribute[1];
   }
-  if (attributes)
-    builder.note(file + ": attribute bytes of triangles (colours, in some programs) are not read");
+  read_colors(file, bytes, count, soup, builder);
+  soup.make_colors_linear();
 }
 
 glm::dvec3 read_vector(std::string_view& line) {
@@ -142,12 +180,13 @@ glm::dvec3 read_vector(std::string_view& line) {
 }
 
 // Keywords in any case, one or more a line: any number of solids, their names free text to the end of the
-// line or to a facet. A line that starts with another word is passed over. A loop with more than three
-// vertices is taken as a polygon.
+// line or to a facet. A line that starts with another word is passed over, with a note. A loop with more than
+// three vertices is taken as a polygon.
 void read_ascii(const std::string& file, std::string_view text, PolygonSoup& soup, MeshBuilder& builder) {
   Budget& budget = builder.budget();
   std::string_view line, word;
   uint32_t normal = kNoIndex;
+  std::set<std::string> unknown;
   const auto start_facet = [&] {
     normal = uint32_t(soup.normals.size());
     budget.push_back(file, soup.normals, glm::vec3(read_vector(line)));
@@ -169,10 +208,15 @@ void read_ascii(const std::string& file, std::string_view text, PolygonSoup& sou
         line = from_facet(line);
         if (!line.empty()) start_facet();
       } else if (!is("outer") && !is("loop") && !is("endloop")) {
+        constexpr size_t kMostWords = 8, kLongest = 32;
+        if (!is_comment(word) && unknown.size() < kMostWords) unknown.emplace(word.substr(0, kLongest));
         break;
       }
     }
   }
+  std::string words;
+  for (const std::string& text_word : unknown) words += (words.empty() ? "" : ", ") + text_word;
+  if (!words.empty()) builder.note(file + ": lines that begin with " + words + " are not read");
   if (soup.corners.size() != (soup.face_ends.empty() ? 0 : soup.face_ends.back())) {
     throw Failure(Exit::kInvalid, file, "ends inside a facet, it is cut short: export or copy it again");
   }
