@@ -136,8 +136,9 @@ class ExactTrace {
   HWY_INLINE void set_slabs(const LspCellGrid& grid, const ivec3& cell) {
     const vec3 at = lsp_vec3(grid.lo) - vec3(grid.margin, grid.margin, grid.margin) +
                     Text::lsp_cell_corner(cell) * grid.size;
-    HWY_ALIGN const float corner_at[4] = {at.x, at.y, at.z, 0.0f};
-    const V4 corner = hn::Load(d4, corner_at);
+    // Put together in registers: what was stored a number at a time could not be loaded as a whole at once.
+    const V4 corner = hn::IfThenElse(hn::FirstN(d4, 1), hn::Set(d4, at.x),
+                                     hn::IfThenElse(hn::FirstN(d4, 2), hn::Set(d4, at.y), hn::Set(d4, at.z)));
     const V4 plus = hn::Mul(hn::Sub(corner, origin_plus_), inverse_);
     const V4 minus = hn::Mul(hn::Sub(corner, origin_minus_), inverse_);
     hn::Store(hn::Mul(inverse_, hn::Set(d4, grid.box_step)), d4, unit_);
