@@ -8,12 +8,12 @@
 #include <iostream>
 #include <memory>
 
-#include "../baker/shapes.h"
 #include "bake.h"
+#include "hard_rays.h"
 #include "lsp/instances.hpp"
 #include "lsp/scene_file.hpp"
 #include "lsp/vulkan_device.hpp"
-#include "rays.h"
+#include "meshes.h"
 #include "writer.h"
 
 // Vulkan drivers and the loader leave memory behind.

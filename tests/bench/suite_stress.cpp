@@ -6,7 +6,7 @@
 #include "context.h"
 #include "lsp/program.h"
 #include "process.h"
-#include "random.h"
+#include "pcg32.h"
 #include "shapes.h"
 #include "verdict.h"
 

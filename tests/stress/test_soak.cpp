@@ -19,7 +19,7 @@
 #include "lsp/vulkan_device.hpp"
 #include "rays.h"
 #include "sanitizer.h"
-#include "scene.h"
+#include "stress_scene.h"
 
 #ifdef LSP_ADDRESS_SANITIZER
 extern "C" size_t __sanitizer_get_current_allocated_bytes();  // of its allocator_interface.h
