@@ -11,6 +11,7 @@
 #include "bake.h"
 #include "hard_rays.h"
 #include "lsp/instances.hpp"
+#include "lsp/program.h"
 #include "lsp/scene_file.hpp"
 #include "lsp/vulkan_device.hpp"
 #include "meshes.h"

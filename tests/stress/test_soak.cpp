@@ -15,6 +15,7 @@
 #include <iostream>
 #include <sstream>
 
+#include "lsp/program.h"
 #include "lsp/scene_file.hpp"
 #include "lsp/vulkan_device.hpp"
 #include "rays.h"
