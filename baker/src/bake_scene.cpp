@@ -93,8 +93,9 @@ void check_instances(const InstancedMeshes& scene, const Arguments& a) {
   }
   try {
     Instances(assets, places);
-  } catch (const Failure& failure) {
-    throw Failure(failure.exit(), a.inputs.front().string(), failure.what());
+  } catch (const Error& error) {
+    const bool too_many = error.status() == LSP_ERROR_LIMIT;
+    throw Failure(too_many ? Exit::kLimit : Exit::kInvalid, a.inputs.front().string(), error.what());
   }
 }
 

@@ -154,29 +154,12 @@ void check_grid(const LspHeader& header, Report& report) {
     }
 }
 
-// The feature bit that a base structure has; nothing for one that there is not.
-std::optional<uint32_t> base_feature(uint32_t base) {
-  switch (base) {
-    case LSP_BASE_BVH:
-      return 0;
-    case LSP_BASE_NTREE:
-      return LSP_FEATURE_NTREE;
-    case LSP_BASE_CELLS:
-      return LSP_FEATURE_CELLS;
-    case LSP_BASE_WIDE:
-      return LSP_FEATURE_WIDE_BASE;
-    default:
-      return std::nullopt;
-  }
-}
-
 void check_base(const LspHeader& header, Report& report) {
   const bool ntree = is_ntree(header);
-  constexpr uint32_t kBases = LSP_FEATURE_NTREE | LSP_FEATURE_CELLS | LSP_FEATURE_WIDE_BASE;
-  const uint32_t features = header.required_features & kBases;
-  if (base_feature(header.base_structure) != features)
+  if (!base_fits(header))
     LSP_HEADER_FINDING(kBaseStructure, base_structure,
-                       "is " + std::to_string(header.base_structure) + " with " + hex(features) +
+                       "is " + std::to_string(header.base_structure) + " with " +
+                           hex(header.required_features & kBaseFeatures) +
                            " of the feature bits NTREE, CELLS and WIDE_BASE");
   const lsp_float3& lo = header.ntree_lo;
   const bool zero = header.ntree_branching == 0 && header.ntree_depth == 0 && header.cell_count == 0 &&

@@ -8,7 +8,7 @@ endif()
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/lsp)
 
 set(libraries lsp lsp_layout)
-set(headers interface.h export.h lsp.h lsp_instances.h scene_file.hpp instances.hpp)
+set(headers interface.h export.h error.hpp lsp.h lsp_instances.h scene_file.hpp instances.hpp)
 if(LSP_VULKAN)
   list(APPEND libraries lsp_vulkan)
   list(APPEND headers lsp_vulkan.h parts.h)
@@ -24,7 +24,7 @@ install(TARGETS ${libraries} EXPORT lspTargets
 install(EXPORT lspTargets NAMESPACE lsp:: DESTINATION ${package_dir} COMPONENT development)
 install(FILES
   ${PROJECT_SOURCE_DIR}/format-spec/include/lsp/layout.h ${PROJECT_SOURCE_DIR}/format-spec/include/lsp/sections.def
-  ${PROJECT_SOURCE_DIR}/format-spec/include/lsp/program.h ${PROJECT_SOURCE_DIR}/format-spec/include/lsp/version.h
+  ${PROJECT_SOURCE_DIR}/format-spec/include/lsp/version.h
   ${headers} ${shader_include}
   DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/lsp COMPONENT development)
 

@@ -15,6 +15,7 @@ namespace {
 
 using format::has_cells;
 using format::is_ntree;
+using format::is_wide;
 using format::Kind;
 using format::kKinds;
 
@@ -94,19 +95,12 @@ lsp_status check_limits(const LspHeader& header, lsp_error* error) {
     return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, alignment),
                 "states an alignment of %u, not 256, 4096 or 65536", header.alignment);
   }
-  const uint32_t features =
-      header.required_features & (LSP_FEATURE_NTREE | LSP_FEATURE_CELLS | LSP_FEATURE_WIDE_BASE);
-  const uint32_t base = features == LSP_FEATURE_NTREE       ? LSP_BASE_NTREE
-                        : features == LSP_FEATURE_CELLS     ? LSP_BASE_CELLS
-                        : features == LSP_FEATURE_WIDE_BASE ? LSP_BASE_WIDE
-                        : features == 0                     ? LSP_BASE_BVH
-                                                            : 0;
-  if (header.base_structure != base) {
+  if (!format::base_fits(header)) {
     return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, base_structure),
                 "states base structure %u, which its features contradict", header.base_structure);
   }
   const bool wide = (header.required_features & LSP_FEATURE_WIDE) != 0;
-  if (base == LSP_BASE_WIDE ? !wide : wide && base != LSP_BASE_CELLS) {
+  if (is_wide(header) ? !wide : wide && !has_cells(header)) {
     return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, required_features),
                 "%s wide nodes, which base structure %u %s", wide ? "has" : "lacks", header.base_structure,
                 wide ? "does not have" : "is made of");

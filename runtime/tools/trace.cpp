@@ -94,7 +94,7 @@ class Scene {
       for (const auto& asset : scene_->assets()) add(*asset);
       target_.instances = &scene_->instances().view();
     } else {
-      file_.emplace(path, physical_memory());
+      file_.emplace(with_failures([&] { return SceneFile(path, physical_memory()); }));
       add(*file_);
       target_.scene = &file_->scene();
     }

@@ -8,7 +8,7 @@
 #include <functional>
 #include <thread>
 
-#include "lsp/program.h"
+#include "lsp/failures.hpp"
 #include "resident.h"
 
 namespace lsp {
@@ -87,9 +87,7 @@ void trace_cpu(const TraceTarget& target, const TraceRequest& request, std::span
     for (size_t i = 1; i < threads; ++i) others.emplace_back(work, i);
     work(0);
   }
-  for (const lsp_error& error : errors) {
-    if (error.status != LSP_OK) throw Failure(static_cast<Exit>(error.status), "", error.message);
-  }
+  for (const lsp_error& error : errors) check(error.status, error);
   if (counts == nullptr) return;
   for (const lsp_trace_counts& sum : sums) lsp_add_counts(counts, &sum);
 }

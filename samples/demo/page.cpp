@@ -227,6 +227,100 @@ document.addEventListener('keydown',e=>{
 document.addEventListener('keyup',e=>{if(holds(e)){e.preventDefault();hold(false);}});
 )";
 
+// Exact and approximate, one over the other and side by side.
+std::string compared(const Figures& f, const Pictures& pictures) {
+  const auto source = [](const std::string& png) { return "data:image/png;base64," + base64(png); };
+  const std::string exact = source(pictures.exact);
+  const std::string approximate = source(pictures.approximate);
+  const std::string difference = source(pictures.difference);
+  const double factor = number(f.compare, "factor");
+  std::string html =
+      "<div class=\"slide\"><img alt=\"exact\" src=\"" + exact +
+      "\"><img class=\"over\" alt=\"approximate\" src=\"" + approximate +
+      "\"><img class=\"error\" alt=\"error map\" src=\"" + difference +
+      "\"><span class=\"bar\"></span><b style=\"left:.5rem\">exact</b><b "
+      "style=\"right:.5rem\">approximate</b>"
+      "<input type=\"range\" min=\"0\" max=\"100\" value=\"50\" aria-label=\"exact or approximate\"></div>\n"
+      "<div class=\"controls\"><button id=\"blink\" type=\"button\">Hold to see approximate</button><button "
+      "id=\"map\" type=\"button\" aria-pressed=\"false\">Error map</button><span id=\"now\" "
+      "role=\"status\"></span>"
+      "<span>Drag, or arrow keys: the border. B, held: approximate, else exact. E: error map.</span></div>\n";
+  html += "<h2>Side by side</h2><div class=\"trio\">\n<figure><img alt=\"\" src=\"" + exact +
+          "\"><figcaption>exact</figcaption></figure>\n<figure><img alt=\"\" src=\"" + approximate +
+          "\"><figcaption>approximate</figcaption></figure>\n<figure><img alt=\"\" src=\"" + difference +
+          "\"><figcaption>absolute difference of linear light, times " + format("%g", factor) +
+          "</figcaption></figure>\n</div>\n";
+  return html;
+}
+
+std::string time_and_error(const Figures& f) {
+  std::string html =
+      "<h2>Time and error</h2>\n<table><thead><tr><th></th><th>exact</th><th>approximate</th></tr></thead>\n";
+  const auto both = [&](const char* name, const char* pattern, const char* key, double scale) {
+    html += row(name, format("%.*f%s", 2, number(f.exact, key) * scale, pattern),
+                format("%.*f%s", 2, number(f.approximate, key) * scale, pattern));
+  };
+  both("indirect rays a second", " million", "indirect_mrays_per_second", 1);
+  both("indirect rays", " million", "indirect_rays", 1e-6);
+  both("time in indirect rays", " s", "indirect_seconds", 1);
+  both("time in primary rays", " s", "primary_seconds", 1);
+  both("time in direct shadow rays", " s", "shadow_seconds", 1);
+  both("time in all", " s", "seconds", 1);
+  html += row("mean luminance", format("%.4f", number(f.exact, "mean_luminance")),
+              format("%.4f", number(f.approximate, "mean_luminance")));
+  html += row("RMSE, linear", "0", format("%.4f", number(f.compare, "rmse")));
+  html += row("mean error", "0", format("%.2f %% of the mean", 100 * number(f.compare, "relative_mean")));
+  html += row("PSNR as shown", "", psnr(f.compare));
+  html += row("pixels that differ visibly", "0",
+              format("%.2f %%", 100 * number(f.compare, "pixels_over_5_percent")));
+  html += "</table>\n<p>" + escape_html(f.exact.at("device").get<std::string>()) + " (" +
+          escape_html(f.exact.at("backend").get<std::string>()) +
+          "), file: " + escape_html(f.exact.at("load_path").get<std::string>()) +
+          format(", %d x %d pixels, %d samples a pixel, ", f.exact.at("width").get<int>(),
+                 f.exact.at("height").get<int>(), f.exact.at("samples").get<int>()) +
+          (f.exact.at("denoised").get<bool>() ? "denoised; the error is that of the pictures shown"
+                                              : "not denoised") +
+          ". A pixel differs visibly where a displayed channel is off by more than 5 %.</p>\n";
+  return html;
+}
+
+std::string the_bake(const Figures& f) {
+  const nlohmann::json& triangles = f.bake.at("triangles");
+  std::string html = "<h2>The bake</h2>\n<dl>\n";
+  html += fact("triangles read", format("%.0f", number(triangles, "read")));
+  html += fact("triangles kept", format("%.0f", number(triangles, "kept")));
+  if (has_cells(f)) {
+    const nlohmann::json& cells = f.bake.at("cells");
+    const nlohmann::json& grid = cells.at("grid");
+    html += fact("cells",
+                 format("%d x %d x %d", grid.at(0).get<int>(), grid.at(1).get<int>(), grid.at(2).get<int>()));
+    html += fact("of them filled", format("%.0f", number(cells, "filled")));
+  } else if (!has_tables(f)) {
+    html += fact("tables", "none");
+  } else {
+    html += fact("Line Spaces", format("%.0f", number(f.bake, "line_spaces")));
+    html += fact("shafts filled", format("%.0f %%", 100 * number(f.bake, "filled_shafts") /
+                                                        std::max(number(f.bake, "shafts"), 1.0)));
+  }
+  html += fact("file", megabytes(number(f.bake, "file_bytes")));
+  html += fact("time to bake", format("%.2f s", total_seconds(f.bake.at("seconds"))));
+  html += fact("peak memory", megabytes(number(f.bake, "peak_memory_bytes")));
+  html += fact("time to validate", format("%.2f s", f.validate_seconds));
+  return html + "</dl>\n";
+}
+
+std::string sections(const Figures& f) {
+  std::string html =
+      "<h2>Sections</h2>\n<table><thead><tr><th>section</th><th>size</th><th>share</th></tr></"
+      "thead>\n";
+  for (const auto& section : f.bake.at("sections")) {
+    html +=
+        row(escape_html(section.at("name").get<std::string>()).c_str(), megabytes(number(section, "bytes")),
+            format("%.1f %%", 100 * number(section, "stored_bytes") / number(f.bake, "file_bytes")));
+  }
+  return html + "</table>\n";
+}
+
 }  // namespace
 
 std::string base64(std::string_view bytes) {
@@ -268,95 +362,15 @@ std::string escape_html(std::string_view text) {
 }
 
 std::string make_page(const Figures& f, const Pictures& pictures) {
-  const auto source = [](const std::string& png) { return "data:image/png;base64," + base64(png); };
-  const std::string exact = source(pictures.exact);
-  const std::string approximate = source(pictures.approximate);
-  const std::string difference = source(pictures.difference);
-  const double factor = number(f.compare, "factor");
-  const nlohmann::json& triangles = f.bake.at("triangles");
-  const nlohmann::json& seconds = f.bake.at("seconds");
   const std::string title = escape_html(f.title);
-
   std::string html =
       "<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n<title>lsp: " +
       title + "</title>\n<style>" + kStyle + "</style>\n<main>\n<h1>Indirect light from " +
       (has_tables(f) ? tables_of(f) : "exact rays") + ": " + title + "</h1>\n" + introduction(f);
+  html += compared(f, pictures) + time_and_error(f) + dial(f) + the_bake(f) + sections(f);
   html +=
-      "<div class=\"slide\"><img alt=\"exact\" src=\"" + exact +
-      "\"><img class=\"over\" alt=\"approximate\" src=\"" + approximate +
-      "\"><img class=\"error\" alt=\"error map\" src=\"" + difference +
-      "\"><span class=\"bar\"></span><b style=\"left:.5rem\">exact</b><b "
-      "style=\"right:.5rem\">approximate</b>"
-      "<input type=\"range\" min=\"0\" max=\"100\" value=\"50\" aria-label=\"exact or approximate\"></div>\n"
-      "<div class=\"controls\"><button id=\"blink\" type=\"button\">Hold to see approximate</button><button "
-      "id=\"map\" type=\"button\" aria-pressed=\"false\">Error map</button><span id=\"now\" "
-      "role=\"status\"></span>"
-      "<span>Drag, or arrow keys: the border. B, held: approximate, else exact. E: error map.</span></div>\n";
-  html += "<h2>Side by side</h2><div class=\"trio\">\n<figure><img alt=\"\" src=\"" + exact +
-          "\"><figcaption>exact</figcaption></figure>\n<figure><img alt=\"\" src=\"" + approximate +
-          "\"><figcaption>approximate</figcaption></figure>\n<figure><img alt=\"\" src=\"" + difference +
-          "\"><figcaption>absolute difference of linear light, times " + format("%g", factor) +
-          "</figcaption></figure>\n</div>\n";
-
-  html +=
-      "<h2>Time and error</h2>\n<table><thead><tr><th></th><th>exact</th><th>approximate</th></tr></thead>\n";
-  const auto both = [&](const char* name, const char* pattern, const char* key, double scale) {
-    html += row(name, format("%.*f%s", 2, number(f.exact, key) * scale, pattern),
-                format("%.*f%s", 2, number(f.approximate, key) * scale, pattern));
-  };
-  both("indirect rays a second", " million", "indirect_mrays_per_second", 1);
-  both("indirect rays", " million", "indirect_rays", 1e-6);
-  both("time in indirect rays", " s", "indirect_seconds", 1);
-  both("time in primary rays", " s", "primary_seconds", 1);
-  both("time in direct shadow rays", " s", "shadow_seconds", 1);
-  both("time in all", " s", "seconds", 1);
-  html += row("mean luminance", format("%.4f", number(f.exact, "mean_luminance")),
-              format("%.4f", number(f.approximate, "mean_luminance")));
-  html += row("RMSE, linear", "0", format("%.4f", number(f.compare, "rmse")));
-  html += row("mean error", "0", format("%.2f %% of the mean", 100 * number(f.compare, "relative_mean")));
-  html += row("PSNR as shown", "", psnr(f.compare));
-  html += row("pixels that differ visibly", "0",
-              format("%.2f %%", 100 * number(f.compare, "pixels_over_5_percent")));
-  html += "</table>\n<p>" + escape_html(f.exact.at("device").get<std::string>()) + " (" +
-          escape_html(f.exact.at("backend").get<std::string>()) +
-          "), file: " + escape_html(f.exact.at("load_path").get<std::string>()) +
-          format(", %d x %d pixels, %d samples a pixel, ", f.exact.at("width").get<int>(),
-                 f.exact.at("height").get<int>(), f.exact.at("samples").get<int>()) +
-          (f.exact.at("denoised").get<bool>() ? "denoised; the error is that of the pictures shown"
-                                              : "not denoised") +
-          ". A pixel differs visibly where a displayed channel is off by more than 5 %.</p>\n";
-
-  html += dial(f) + "<h2>The bake</h2>\n<dl>\n";
-  html += fact("triangles read", format("%.0f", number(triangles, "read")));
-  html += fact("triangles kept", format("%.0f", number(triangles, "kept")));
-  if (has_cells(f)) {
-    const nlohmann::json& cells = f.bake.at("cells");
-    const nlohmann::json& grid = cells.at("grid");
-    html += fact("cells",
-                 format("%d x %d x %d", grid.at(0).get<int>(), grid.at(1).get<int>(), grid.at(2).get<int>()));
-    html += fact("of them filled", format("%.0f", number(cells, "filled")));
-  } else if (!has_tables(f)) {
-    html += fact("tables", "none");
-  } else {
-    html += fact("Line Spaces", format("%.0f", number(f.bake, "line_spaces")));
-    html += fact("shafts filled", format("%.0f %%", 100 * number(f.bake, "filled_shafts") /
-                                                        std::max(number(f.bake, "shafts"), 1.0)));
-  }
-  html += fact("file", megabytes(number(f.bake, "file_bytes")));
-  html += fact("time to bake", format("%.2f s", total_seconds(seconds)));
-  html += fact("peak memory", megabytes(number(f.bake, "peak_memory_bytes")));
-  html += fact("time to validate", format("%.2f s", f.validate_seconds));
-  html +=
-      "</dl>\n<h2>Sections</h2>\n<table><thead><tr><th>section</th><th>size</th><th>share</th></tr></"
-      "thead>\n";
-  for (const auto& section : f.bake.at("sections")) {
-    html +=
-        row(escape_html(section.at("name").get<std::string>()).c_str(), megabytes(number(section, "bytes")),
-            format("%.1f %%", 100 * number(section, "stored_bytes") / number(f.bake, "file_bytes")));
-  }
-  html += "</table>\n<h2>Skipped, because the scene does not need it</h2>\n<ul>\n" +
-          list(f.bake.at("skipped")) + "</ul>\n";
+      "<h2>Skipped, because the scene does not need it</h2>\n<ul>\n" + list(f.bake.at("skipped")) + "</ul>\n";
   if (!f.bake.at("notes").empty())
     html += "<h2>Notes of the import</h2>\n<ul>\n" + list(f.bake.at("notes")) + "</ul>\n";
   html += std::string("</main>\n<script>") + kScript + "</script>\n</html>\n";

@@ -106,6 +106,114 @@ struct Device {
   }
 };
 
+// The ready trace shader with the one set that it reads.
+struct Pipeline {
+  VkDescriptorSetLayout set_layout = VK_NULL_HANDLE;
+  VkPipelineLayout layout = VK_NULL_HANDLE;
+  VkShaderModule module = VK_NULL_HANDLE;
+  VkPipeline pipeline = VK_NULL_HANDLE;
+  VkDescriptorPool pool = VK_NULL_HANDLE;
+  VkDescriptorSet set = VK_NULL_HANDLE;
+};
+
+// [lsp] A pipeline of the ready trace shader. An engine can include lsp/lsp.glsl in its own shaders instead.
+Pipeline make_pipeline(const Device& gpu, const lsp_vulkan_plan& plan) {
+  Pipeline out;
+  VkDescriptorSetLayoutBinding bindings[LSP_BINDING_COUNT];
+  lsp_vulkan_layout_bindings(bindings);
+  auto set_layout_info =
+      make<VkDescriptorSetLayoutCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO);
+  set_layout_info.bindingCount = LSP_BINDING_COUNT;
+  set_layout_info.pBindings = bindings;
+  check(vkCreateDescriptorSetLayout(gpu.device, &set_layout_info, nullptr, &out.set_layout),
+        "vkCreateDescriptorSetLayout");
+  const VkPushConstantRange push{VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof(lsp_vulkan_trace_constants)};
+  auto layout_info = make<VkPipelineLayoutCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO);
+  layout_info.setLayoutCount = 1;
+  layout_info.pSetLayouts = &out.set_layout;
+  layout_info.pushConstantRangeCount = 1;
+  layout_info.pPushConstantRanges = &push;
+  check(vkCreatePipelineLayout(gpu.device, &layout_info, nullptr, &out.layout), "vkCreatePipelineLayout");
+  auto module_info = make<VkShaderModuleCreateInfo>(VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO);
+  module_info.pCode = lsp_vulkan_trace_spirv(&plan, 0, &module_info.codeSize);
+  check(vkCreateShaderModule(gpu.device, &module_info, nullptr, &out.module), "vkCreateShaderModule");
+  auto pipeline_info = make<VkComputePipelineCreateInfo>(VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO);
+  pipeline_info.stage = {VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
+                         nullptr,
+                         0,
+                         VK_SHADER_STAGE_COMPUTE_BIT,
+                         out.module,
+                         "main",
+                         nullptr};
+  pipeline_info.layout = out.layout;
+  // The kind of trace is compiled in.
+  const uint32_t flags = LSP_TRACE_APPROXIMATE;
+  const VkSpecializationMapEntry flags_entry{LSP_VULKAN_FLAGS_CONSTANT, 0, sizeof flags};
+  const VkSpecializationInfo specialization{1, &flags_entry, sizeof flags, &flags};
+  pipeline_info.stage.pSpecializationInfo = &specialization;
+  check(vkCreateComputePipelines(gpu.device, VK_NULL_HANDLE, 1, &pipeline_info, nullptr, &out.pipeline),
+        "vkCreateComputePipelines");
+  return out;
+}
+
+void add_set(const Device& gpu, Pipeline& out) {
+  const VkDescriptorPoolSize pool_size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, LSP_BINDING_COUNT};
+  auto pool_info = make<VkDescriptorPoolCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO);
+  pool_info.maxSets = 1;
+  pool_info.poolSizeCount = 1;
+  pool_info.pPoolSizes = &pool_size;
+  check(vkCreateDescriptorPool(gpu.device, &pool_info, nullptr, &out.pool), "vkCreateDescriptorPool");
+  auto set_info = make<VkDescriptorSetAllocateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO);
+  set_info.descriptorPool = out.pool;
+  set_info.descriptorSetCount = 1;
+  set_info.pSetLayouts = &out.set_layout;
+  check(vkAllocateDescriptorSets(gpu.device, &set_info, &out.set), "vkAllocateDescriptorSets");
+}
+
+// [lsp] Records the dispatch of one ray, submits it and waits.
+void trace(const Device& gpu, const lsp_vulkan_functions& functions, const Pipeline& with, uint32_t dial) {
+  auto command_pool_info = make<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
+  command_pool_info.queueFamilyIndex = gpu.family;
+  VkCommandPool command_pool;
+  check(vkCreateCommandPool(gpu.device, &command_pool_info, nullptr, &command_pool), "vkCreateCommandPool");
+  auto commands_info = make<VkCommandBufferAllocateInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO);
+  commands_info.commandPool = command_pool;
+  commands_info.commandBufferCount = 1;
+  VkCommandBuffer commands;
+  check(vkAllocateCommandBuffers(gpu.device, &commands_info, &commands), "vkAllocateCommandBuffers");
+  const auto begin = make<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
+  check(vkBeginCommandBuffer(commands, &begin), "vkBeginCommandBuffer");
+  const lsp_vulkan_trace_constants constants{.lod = 0.0f, .first = 0, .count = 1, .dial = dial};
+  lsp_vulkan_record_trace(&functions, commands, with.pipeline, with.layout, with.set, &constants);
+  VkMemoryBarrier done{.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER,
+                       .pNext = nullptr,
+                       .srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT,
+                       .dstAccessMask = VK_ACCESS_HOST_READ_BIT};
+  vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_PIPELINE_STAGE_HOST_BIT, 0, 1,
+                       &done, 0, nullptr, 0, nullptr);
+  check(vkEndCommandBuffer(commands), "vkEndCommandBuffer");
+  auto submit = make<VkSubmitInfo>(VK_STRUCTURE_TYPE_SUBMIT_INFO);
+  submit.commandBufferCount = 1;
+  submit.pCommandBuffers = &commands;
+  check(vkQueueSubmit(gpu.queue, 1, &submit, VK_NULL_HANDLE), "vkQueueSubmit");
+  check(vkQueueWaitIdle(gpu.queue), "vkQueueWaitIdle");
+  vkDestroyCommandPool(gpu.device, command_pool, nullptr);
+}
+
+void destroy(const Device& gpu, const Pipeline& pipeline, const std::vector<Buffer>& buffers) {
+  vkDestroyDescriptorPool(gpu.device, pipeline.pool, nullptr);
+  vkDestroyPipeline(gpu.device, pipeline.pipeline, nullptr);
+  vkDestroyShaderModule(gpu.device, pipeline.module, nullptr);
+  vkDestroyPipelineLayout(gpu.device, pipeline.layout, nullptr);
+  vkDestroyDescriptorSetLayout(gpu.device, pipeline.set_layout, nullptr);
+  for (const Buffer& buffer : buffers) {
+    vkDestroyBuffer(gpu.device, buffer.buffer, nullptr);
+    vkFreeMemory(gpu.device, buffer.memory, nullptr);
+  }
+  vkDestroyDevice(gpu.device, nullptr);
+  vkDestroyInstance(gpu.instance, nullptr);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -151,91 +259,13 @@ int main(int argc, char** argv) {
       {0.5f * (lo.x + hi.x), hi.y + 0.1f * (hi.y - lo.y), 0.5f * (lo.z + hi.z)}, 0.0f, {0, -1, 0}, INFINITY};
   std::memcpy(rays.mapped, &ray, sizeof ray);
 
-  // [lsp] A pipeline of the ready trace shader. An engine can include lsp/lsp.glsl in its own shaders
-  // instead.
-  VkDescriptorSetLayoutBinding bindings[LSP_BINDING_COUNT];
-  lsp_vulkan_layout_bindings(bindings);
-  auto set_layout_info =
-      make<VkDescriptorSetLayoutCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO);
-  set_layout_info.bindingCount = LSP_BINDING_COUNT;
-  set_layout_info.pBindings = bindings;
-  VkDescriptorSetLayout set_layout;
-  check(vkCreateDescriptorSetLayout(gpu.device, &set_layout_info, nullptr, &set_layout),
-        "vkCreateDescriptorSetLayout");
-  const VkPushConstantRange push{VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof(lsp_vulkan_trace_constants)};
-  auto layout_info = make<VkPipelineLayoutCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO);
-  layout_info.setLayoutCount = 1;
-  layout_info.pSetLayouts = &set_layout;
-  layout_info.pushConstantRangeCount = 1;
-  layout_info.pPushConstantRanges = &push;
-  VkPipelineLayout layout;
-  check(vkCreatePipelineLayout(gpu.device, &layout_info, nullptr, &layout), "vkCreatePipelineLayout");
-  auto module_info = make<VkShaderModuleCreateInfo>(VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO);
-  module_info.pCode = lsp_vulkan_trace_spirv(&plan, 0, &module_info.codeSize);
-  VkShaderModule module;
-  check(vkCreateShaderModule(gpu.device, &module_info, nullptr, &module), "vkCreateShaderModule");
-  auto pipeline_info = make<VkComputePipelineCreateInfo>(VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO);
-  pipeline_info.stage = {VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
-                         nullptr,
-                         0,
-                         VK_SHADER_STAGE_COMPUTE_BIT,
-                         module,
-                         "main",
-                         nullptr};
-  pipeline_info.layout = layout;
-  // The kind of trace is compiled in.
-  const uint32_t flags = LSP_TRACE_APPROXIMATE;
-  const VkSpecializationMapEntry flags_entry{LSP_VULKAN_FLAGS_CONSTANT, 0, sizeof flags};
-  const VkSpecializationInfo specialization{1, &flags_entry, sizeof flags, &flags};
-  pipeline_info.stage.pSpecializationInfo = &specialization;
-  VkPipeline pipeline;
-  check(vkCreateComputePipelines(gpu.device, VK_NULL_HANDLE, 1, &pipeline_info, nullptr, &pipeline),
-        "vkCreateComputePipelines");
-  const VkDescriptorPoolSize pool_size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, LSP_BINDING_COUNT};
-  auto pool_info = make<VkDescriptorPoolCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO);
-  pool_info.maxSets = 1;
-  pool_info.poolSizeCount = 1;
-  pool_info.pPoolSizes = &pool_size;
-  VkDescriptorPool pool;
-  check(vkCreateDescriptorPool(gpu.device, &pool_info, nullptr, &pool), "vkCreateDescriptorPool");
-  auto set_info = make<VkDescriptorSetAllocateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO);
-  set_info.descriptorPool = pool;
-  set_info.descriptorSetCount = 1;
-  set_info.pSetLayouts = &set_layout;
-  VkDescriptorSet set;
-  check(vkAllocateDescriptorSets(gpu.device, &set_info, &set), "vkAllocateDescriptorSets");
+  Pipeline pipeline = make_pipeline(gpu, plan);
+  add_set(gpu, pipeline);
   lsp_vulkan_functions functions{};
   check(lsp_vulkan_load_functions(gpu.device, vkGetDeviceProcAddr, &functions, &error), error, file);
-  lsp_vulkan_write_descriptors(&functions, gpu.device, set, &plan, handles.data(), rays.buffer, hits.buffer,
-                               VK_NULL_HANDLE);
-
-  // [lsp] Record the dispatch; submit it and wait.
-  auto command_pool_info = make<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
-  command_pool_info.queueFamilyIndex = gpu.family;
-  VkCommandPool command_pool;
-  check(vkCreateCommandPool(gpu.device, &command_pool_info, nullptr, &command_pool), "vkCreateCommandPool");
-  auto commands_info = make<VkCommandBufferAllocateInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO);
-  commands_info.commandPool = command_pool;
-  commands_info.commandBufferCount = 1;
-  VkCommandBuffer commands;
-  check(vkAllocateCommandBuffers(gpu.device, &commands_info, &commands), "vkAllocateCommandBuffers");
-  const auto begin = make<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
-  check(vkBeginCommandBuffer(commands, &begin), "vkBeginCommandBuffer");
-  const lsp_vulkan_trace_constants constants{
-      .lod = 0.0f, .first = 0, .count = 1, .dial = scene.header->quality[LSP_QUALITY_BALANCED]};
-  lsp_vulkan_record_trace(&functions, commands, pipeline, layout, set, &constants);
-  VkMemoryBarrier done{.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER,
-                       .pNext = nullptr,
-                       .srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT,
-                       .dstAccessMask = VK_ACCESS_HOST_READ_BIT};
-  vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_PIPELINE_STAGE_HOST_BIT, 0, 1,
-                       &done, 0, nullptr, 0, nullptr);
-  check(vkEndCommandBuffer(commands), "vkEndCommandBuffer");
-  auto submit = make<VkSubmitInfo>(VK_STRUCTURE_TYPE_SUBMIT_INFO);
-  submit.commandBufferCount = 1;
-  submit.pCommandBuffers = &commands;
-  check(vkQueueSubmit(gpu.queue, 1, &submit, VK_NULL_HANDLE), "vkQueueSubmit");
-  check(vkQueueWaitIdle(gpu.queue), "vkQueueWaitIdle");
+  lsp_vulkan_write_descriptors(&functions, gpu.device, pipeline.set, &plan, handles.data(), rays.buffer,
+                               hits.buffer, VK_NULL_HANDLE);
+  trace(gpu, functions, pipeline, scene.header->quality[LSP_QUALITY_BALANCED]);
 
   LspHit hit;
   std::memcpy(&hit, hits.mapped, sizeof hit);
@@ -246,19 +276,8 @@ int main(int argc, char** argv) {
                 static_cast<double>(hit.t));
   }
 
-  vkDestroyCommandPool(gpu.device, command_pool, nullptr);
-  vkDestroyDescriptorPool(gpu.device, pool, nullptr);
-  vkDestroyPipeline(gpu.device, pipeline, nullptr);
-  vkDestroyShaderModule(gpu.device, module, nullptr);
-  vkDestroyPipelineLayout(gpu.device, layout, nullptr);
-  vkDestroyDescriptorSetLayout(gpu.device, set_layout, nullptr);
   buffers.insert(buffers.end(), {rays, hits});
-  for (const Buffer& buffer : buffers) {
-    vkDestroyBuffer(gpu.device, buffer.buffer, nullptr);
-    vkFreeMemory(gpu.device, buffer.memory, nullptr);
-  }
-  vkDestroyDevice(gpu.device, nullptr);
-  vkDestroyInstance(gpu.instance, nullptr);
+  destroy(gpu, pipeline, buffers);
   lsp_unmap_file(&mapping);
   return 0;
 }

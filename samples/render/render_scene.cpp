@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lsp/failures.hpp"
 #include "lsp/instanced_scene.hpp"
-#include "lsp/program.h"
 
 namespace lsp::sample {
 namespace {
@@ -24,7 +24,7 @@ RenderScene::RenderScene(const std::filesystem::path& path) : path_(path.string(
     for (size_t i = 0; i < instanced_->assets().size(); ++i)
       add_asset(*instanced_->assets()[i], instanced_->asset_paths()[i]);
   } else {
-    file_.emplace(path_);
+    file_.emplace(with_failures([&] { return SceneFile(path_); }));
     add_asset(*file_, path_);
   }
   find_emitters();
@@ -70,10 +70,11 @@ glm::vec3 RenderScene::hi() const {
 
 void RenderScene::trace(const lsp_trace_options& options, std::span<const LspRay> rays,
                         std::span<LspHit> hits, lsp_trace_counts* counts) const {
-  if (instanced_ != nullptr) return instanced_->instances().trace(options, 0xFF, rays, hits, counts);
+  if (instanced_ != nullptr) {
+    return with_failures([&] { instanced_->instances().trace(options, 0xFF, rays, hits, counts); });
+  }
   lsp_error error{};
-  if (lsp_trace(single(), &options, rays.data(), hits.data(), rays.size(), counts, &error) != LSP_OK)
-    throw Failure(static_cast<Exit>(error.status), "", error.message);
+  check(lsp_trace(single(), &options, rays.data(), hits.data(), rays.size(), counts, &error), error);
 }
 
 void RenderScene::index_primitives(Asset& asset, const std::string& file) const {

@@ -6,10 +6,10 @@
 #include <memory>
 #include <sstream>
 
+#include "hard_rays.h"
 #include "lsp/lsp.h"
 #include "lsp/program.h"
 #include "lsp/vulkan_device.hpp"
-#include "rays.h"
 #include "scene_builder.h"
 
 namespace lsp::test {

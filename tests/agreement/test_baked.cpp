@@ -9,12 +9,12 @@
 #include <filesystem>
 
 #include "bake.h"
+#include "hard_rays.h"
 #include "import/import.h"
 #include "lsp/lsp.h"
 #include "lsp/lsp_vulkan.h"
 #include "lsp/scene_file.hpp"
 #include "lsp/vulkan_device.hpp"
-#include "rays.h"
 #include "scene_builder.h"
 #include "writer.h"
 

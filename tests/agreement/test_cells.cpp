@@ -9,15 +9,15 @@
 
 #include <tbb/global_control.h>
 
-#include "../baker/shapes.h"
 #include "bake.h"
 #include "cells/cell_grid.h"
+#include "hard_rays.h"
 #include "lsp/lsp.h"
 #include "lsp/lsp_vulkan.h"
 #include "lsp/program.h"
 #include "lsp/scene_file.hpp"
 #include "lsp/vulkan_device.hpp"
-#include "rays.h"
+#include "meshes.h"
 #include "surface_rays.h"
 #include "view_rays.h"
 #include "writer.h"

@@ -10,15 +10,15 @@
 #include <filesystem>
 #include <optional>
 
-#include "../baker/shapes.h"
 #include "bake.h"
 #include "color_materials.h"
+#include "hard_rays.h"
 #include "import/import.h"
 #include "lsp/lsp.h"
 #include "lsp/lsp_vulkan.h"
 #include "lsp/scene_file.hpp"
 #include "lsp/vulkan_device.hpp"
-#include "rays.h"
+#include "meshes.h"
 #include "surface_rays.h"
 #include "writer.h"
 

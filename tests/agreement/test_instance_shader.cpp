@@ -9,13 +9,14 @@
 #include <iostream>
 #include <memory>
 
-#include "../baker/shapes.h"
 #include "bake.h"
+#include "hard_rays.h"
 #include "lsp/instances.hpp"
+#include "lsp/program.h"
 #include "lsp/scene_file.hpp"
 #include "lsp/vulkan_device.hpp"
+#include "meshes.h"
 #include "offset_shader.h"
-#include "rays.h"
 #include "writer.h"
 
 // Vulkan drivers and the loader leave memory behind.

@@ -14,11 +14,11 @@
 #include <set>
 #include <string>
 
-#include "../baker/shapes.h"
 #include "bake.h"
 #include "device.h"
+#include "hard_rays.h"
 #include "lsp/scene_file.hpp"
-#include "rays.h"
+#include "meshes.h"
 #include "surface_rays.h"
 #include "writer.h"
 

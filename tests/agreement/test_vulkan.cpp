@@ -9,10 +9,10 @@
 #include <filesystem>
 #include <fstream>
 
+#include "hard_rays.h"
 #include "lsp/lsp.h"
 #include "lsp/program.h"
 #include "lsp/vulkan_device.hpp"
-#include "rays.h"
 #include "scene_builder.h"
 
 // Drivers leave memory behind, in modules that are gone at the end: leaks are looked for in the other tests.

@@ -9,10 +9,10 @@
 #include <random>
 #include <set>
 
-#include "../baker/shapes.h"
 #include "bake.h"
+#include "hard_rays.h"
 #include "lsp/lsp.h"
-#include "rays.h"
+#include "meshes.h"
 #include "surface_rays.h"
 #include "trace_cells_wide.h"
 #include "trace_wide_lanes.h"

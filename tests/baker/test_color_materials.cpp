@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "shapes.h"
+#include "meshes.h"
 
 namespace lsp::test {
 namespace {

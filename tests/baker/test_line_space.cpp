@@ -11,7 +11,7 @@
 #include "error.h"
 #include "lsp/lsp.h"
 #include "lsp/program.h"
-#include "shapes.h"
+#include "meshes.h"
 
 namespace lsp::test {
 namespace {

@@ -12,7 +12,7 @@
 #include "import/import.h"
 #include "lsp/lsp.h"
 #include "lsp/program.h"
-#include "shapes.h"
+#include "meshes.h"
 
 namespace lsp::test {
 namespace {

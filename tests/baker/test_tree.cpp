@@ -8,7 +8,7 @@
 
 #include "box.h"
 #include "bvh.h"
-#include "shapes.h"
+#include "meshes.h"
 
 namespace lsp::test {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "box.h"
 #include "bvh.h"
-#include "shapes.h"
+#include "meshes.h"
 #include "wide_tree.h"
 
 namespace lsp::test {

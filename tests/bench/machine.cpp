@@ -3,15 +3,14 @@
 #include <sys/utsname.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cstdlib>
 #include <ctime>
 #include <fstream>
-#include <thread>
 
 #include "embree_scene.h"
 #include "lsp/layout.h"
 #include "lsp/program.h"
+#include "timing.h"
 
 namespace lsp::bench {
 namespace {
@@ -36,8 +35,6 @@ std::string cache(long name) {
 }
 
 }  // namespace
-
-unsigned machine_threads() { return std::max(1u, std::thread::hardware_concurrency()); }
 
 double machine_load() {
   double load = 0;

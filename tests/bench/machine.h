@@ -8,9 +8,6 @@ namespace lsp::bench {
 // Processor, cores, caches, memory, system, compiler, versions, time of day, load before the run.
 Json machine_facts();
 
-// Threads that run at once on this machine, at least 1.
-unsigned machine_threads();
-
 // Load average over the last minute: above a fraction of one, somebody else is using the machine.
 double machine_load();
 

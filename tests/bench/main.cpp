@@ -9,6 +9,7 @@
 #include "context.h"
 #include "lsp/command_line.h"
 #include "machine.h"
+#include "timing.h"
 
 namespace lsp::bench {
 namespace {

@@ -5,7 +5,6 @@
 
 #include "bake_cache.h"
 #include "lsp/program.h"
-#include "machine.h"
 #include "process.h"
 #include "timing.h"
 

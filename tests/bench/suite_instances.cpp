@@ -66,7 +66,9 @@ class PlacedOnCpu : public Tracer {
   double trace(const Mode& mode, std::span<const LspRay> rays, std::span<LspHit> hits) override {
     const lsp_trace_options options = mode.options();
     return run_in_chunks(rays.size(), threads_, [&](size_t first, size_t count) {
-      placed_.instances().trace(options, 0xFF, rays.subspan(first, count), hits.subspan(first, count));
+      with_failures([&] {
+        placed_.instances().trace(options, 0xFF, rays.subspan(first, count), hits.subspan(first, count));
+      });
     });
   }
 

@@ -5,8 +5,8 @@
 #include "checks.h"
 #include "context.h"
 #include "lsp/program.h"
+#include "pcg32.h"
 #include "process.h"
-#include "random.h"
 #include "shapes.h"
 #include "verdict.h"
 
@@ -23,6 +23,7 @@ struct StressCase {
   std::function<Triangles()> make;
 };
 
+// A table. NOLINTNEXTLINE(readability-function-size)
 const std::vector<StressCase>& stress_cases() {
   static const std::vector<StressCase> cases = {
       {"one triangle",
@@ -145,6 +146,30 @@ Table family_table(Context& context) {
   return table;
 }
 
+// What a baked file answers against Embree, and its tables' errors.
+void add_answers(const Context& context, const std::filesystem::path& baked, Json& row) {
+  const OpenFile file(baked);
+  const Soup soup = soup_of(file.scene());
+  const EmbreeScene embree(soup);
+  const std::vector<LspRay> rays = surface_rays(soup, context.accuracy_rays() / 5, 1);
+  std::vector<LspHit> truth(rays.size()), exact(rays.size()), approximate(rays.size());
+  embree_tracer(embree, EmbreeCall::kSingle, "", context.threads)->trace({}, rays, truth);
+  const auto ours = cpu_tracer(file, context.threads);
+  ours->trace({}, rays, exact);
+  const Agreement agreement = compare_exact(soup, rays, exact, truth);
+  row["ties"] = agreement.ties;
+  row["grazes"] = agreement.grazes;
+  row["unresolved"] = agreement.unresolved;
+  row["ours_wrong"] = agreement.ours_wrong + agreement.both_wrong;
+  row["embree_wrong"] = agreement.reference_wrong;
+  if (file.has_line_spaces()) {
+    ours->trace({.approximate = true}, rays, approximate);
+    const RayErrors errors = ray_errors(soup, rays, exact, approximate);
+    row["true_hits_percent"] = 100 * static_cast<double>(errors.true_hits) / static_cast<double>(rays.size());
+    add_errors(row, errors);
+  }
+}
+
 }  // namespace
 
 Section stress_suite(Context& context) {
@@ -200,27 +225,7 @@ Section stress_suite(Context& context) {
       if (check.exit_code != 0)
         context.warnings.push_back("stress, " + stress.name + ": the file is not valid");
       row["file_mb"] = static_cast<double>(std::filesystem::file_size(baked_path)) * 1e-6;
-      const OpenFile file(baked_path);
-      const Soup soup = soup_of(file.scene());
-      const EmbreeScene embree(soup);
-      const std::vector<LspRay> rays = surface_rays(soup, context.accuracy_rays() / 5, 1);
-      std::vector<LspHit> truth(rays.size()), exact(rays.size()), approximate(rays.size());
-      embree_tracer(embree, EmbreeCall::kSingle, "", context.threads)->trace({}, rays, truth);
-      const auto ours = cpu_tracer(file, context.threads);
-      ours->trace({}, rays, exact);
-      const Agreement agreement = compare_exact(soup, rays, exact, truth);
-      row["ties"] = agreement.ties;
-      row["grazes"] = agreement.grazes;
-      row["unresolved"] = agreement.unresolved;
-      row["ours_wrong"] = agreement.ours_wrong + agreement.both_wrong;
-      row["embree_wrong"] = agreement.reference_wrong;
-      if (file.has_line_spaces()) {
-        ours->trace({.approximate = true}, rays, approximate);
-        const RayErrors errors = ray_errors(soup, rays, exact, approximate);
-        row["true_hits_percent"] =
-            100 * static_cast<double>(errors.true_hits) / static_cast<double>(rays.size());
-        add_errors(row, errors);
-      }
+      add_answers(context, baked_path, row);
       table.rows.push_back(row);
     });
   }

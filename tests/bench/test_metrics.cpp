@@ -7,8 +7,8 @@
 
 #include "image.h"
 #include "lsp/program.h"
+#include "pcg32.h"
 #include "picture_errors.h"
-#include "random.h"
 #include "ray_errors.h"
 
 namespace lsp::bench {

@@ -13,10 +13,10 @@
 
 #include "context.h"
 #include "lsp/program.h"
-#include "machine.h"
 #include "process.h"
 #include "shapes.h"
-#include "test_bakes.h"
+#include "shared_bake.h"
+#include "timing.h"
 #include "verdict.h"
 
 namespace lsp::bench {

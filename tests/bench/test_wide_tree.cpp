@@ -7,10 +7,10 @@
 #include <filesystem>
 
 #include "lsp/program.h"
-#include "machine.h"
 #include "rays.h"
 #include "shapes.h"
-#include "test_bakes.h"
+#include "shared_bake.h"
+#include "timing.h"
 #include "verdict.h"
 #include "wide_peer.h"
 

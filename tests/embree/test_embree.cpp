@@ -12,11 +12,10 @@
 
 #include "embree_scene.h"
 #include "leaks.h"
-#include "machine.h"
 #include "open_file.h"
 #include "ray_errors.h"
 #include "rays.h"
-#include "test_bakes.h"
+#include "shared_bake.h"
 #include "timing.h"
 #include "tracer.h"
 #include "verdict.h"

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "lsp/failures.hpp"
 #include "lsp/lsp.h"
 #include "lsp/scene_file.hpp"
 #include "resident.h"
@@ -28,9 +29,10 @@ class Files : public testing::Test {
         .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
     return path.string();
   }
-  static Exit exit_of(const std::string& path, uint64_t limit = UINT64_MAX) {
+  // Of a program that opens it.
+  static Exit exit_code(const std::string& path, uint64_t limit = UINT64_MAX) {
     try {
-      const SceneFile file(path, limit);
+      with_failures([&] { SceneFile(path, limit); });
       return Exit::kDone;
     } catch (const Failure& failure) {
       EXPECT_EQ(failure.file(), path);
@@ -136,12 +138,12 @@ TEST_F(Files, ExitCodes) {
   header_of(newer).version_major = LSP_VERSION_MAJOR + 1;
   Bytes damaged = write_packed(parts);
   damaged[section_of(damaged, LSP_SECTION_NODE).offset + 9] ^= 0xFF;
-  EXPECT_EQ(exit_of((folder_ / "missing.lsp").string()), Exit::kFile);
-  EXPECT_EQ(exit_of(write("empty.lsp", {})), Exit::kInvalid);
-  EXPECT_EQ(exit_of(write("cut.lsp", cut)), Exit::kInvalid);
-  EXPECT_EQ(exit_of(write("newer.lsp", newer)), Exit::kUnsupported);
-  EXPECT_EQ(exit_of(write("damaged.lsp", damaged)), Exit::kInvalid);
-  EXPECT_EQ(exit_of(write("large.lsp", write_packed(parts)), 4096), Exit::kLimit);
+  EXPECT_EQ(exit_code((folder_ / "missing.lsp").string()), Exit::kFile);
+  EXPECT_EQ(exit_code(write("empty.lsp", {})), Exit::kInvalid);
+  EXPECT_EQ(exit_code(write("cut.lsp", cut)), Exit::kInvalid);
+  EXPECT_EQ(exit_code(write("newer.lsp", newer)), Exit::kUnsupported);
+  EXPECT_EQ(exit_code(write("damaged.lsp", damaged)), Exit::kInvalid);
+  EXPECT_EQ(exit_code(write("large.lsp", write_packed(parts)), 4096), Exit::kLimit);
 }
 
 }  // namespace

@@ -263,7 +263,7 @@ TEST(Instances, IdentityIsTheAssetItself) {
       const lsp_trace_options options{flags, 0};
       if (lsp_trace(&file.scene(), &options, rays.data(), expected.data(), rays.size(), nullptr, nullptr) !=
           LSP_OK) {
-        EXPECT_THROW(instances.trace(options, 255, rays, hits), Failure);
+        EXPECT_THROW(instances.trace(options, 255, rays, hits), Error);
         continue;
       }
       instances.trace(options, 255, rays, hits);
@@ -359,7 +359,7 @@ TEST(Instances, NoneAtAll) {
   EXPECT_EQ(lsp_instance_hit_offset(&none.view(), &hit), 0);
   lsp_instances empty;
   EXPECT_EQ(lsp_instances_build(nullptr, 0, nullptr, 0, nullptr, 0, &empty, nullptr), LSP_OK);
-  EXPECT_THROW(none.trace({0x40, 0}, 255, {&ray, 1}, {&hit, 1}), Failure);
+  EXPECT_THROW(none.trace({0x40, 0}, 255, {&ray, 1}, {&hit, 1}), Error);
 }
 
 TEST(Instances, OffsetGrowsWithTheInstance) {

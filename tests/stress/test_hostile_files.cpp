@@ -109,6 +109,7 @@ std::string instanced(const std::string& more, size_t primitives, size_t instanc
       R"(]}],"nodes":[{"mesh":0,"extensions":{"EXT_mesh_gpu_instancing":{"attributes":{"TRANSLATION":1}}}}])");
 }
 
+// A table. NOLINTNEXTLINE(readability-function-size)
 const std::vector<Hostile>& files() {
   using enum Exit;
   static const std::vector<Hostile> all = {

@@ -15,11 +15,12 @@
 #include <iostream>
 #include <sstream>
 
+#include "lsp/program.h"
 #include "lsp/scene_file.hpp"
 #include "lsp/vulkan_device.hpp"
 #include "rays.h"
 #include "sanitizer.h"
-#include "scene.h"
+#include "stress_scene.h"
 
 #ifdef LSP_ADDRESS_SANITIZER
 extern "C" size_t __sanitizer_get_current_allocated_bytes();  // of its allocator_interface.h

@@ -59,6 +59,29 @@ constexpr bool is_ntree(const LspHeader& h) { return h.base_structure == LSP_BAS
 constexpr bool has_cells(const LspHeader& h) { return h.base_structure == LSP_BASE_CELLS; }
 constexpr bool is_wide(const LspHeader& h) { return h.base_structure == LSP_BASE_WIDE; }
 
+inline constexpr uint32_t kBaseFeatures = LSP_FEATURE_NTREE | LSP_FEATURE_CELLS | LSP_FEATURE_WIDE_BASE;
+
+// The one of them that a base structure has, 0 for a BVH; nothing for a base that there is not.
+constexpr std::optional<uint32_t> base_feature(uint32_t base) {
+  switch (base) {
+    case LSP_BASE_BVH:
+      return 0;
+    case LSP_BASE_NTREE:
+      return LSP_FEATURE_NTREE;
+    case LSP_BASE_CELLS:
+      return LSP_FEATURE_CELLS;
+    case LSP_BASE_WIDE:
+      return LSP_FEATURE_WIDE_BASE;
+    default:
+      return std::nullopt;
+  }
+}
+
+// Whether the header's base structure is the one that its features say.
+constexpr bool base_fits(const LspHeader& h) {
+  return base_feature(h.base_structure) == (h.required_features & kBaseFeatures);
+}
+
 // Whether a file with this header may have sections of `base`; one of unknown base is read as a BVH. One of
 // cells has the tree for exact rays besides: wide nodes, before 2.3 a BVH.
 constexpr bool holds_base(const LspHeader& h, uint32_t base) {

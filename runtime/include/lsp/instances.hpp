@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "lsp/error.hpp"
 #include "lsp/lsp_instances.h"
-#include "lsp/program.h"
 
 namespace lsp {
 
@@ -30,7 +30,7 @@ class View {
 };
 
 // Built from scenes and places, and again as places change; memory is kept from one time to the next. Errors
-// are thrown as lsp::Failure. Tracing is const and may be done from any number of threads, but not while
+// are thrown as lsp::Error. Tracing is const and may be done from any number of threads, but not while
 // build runs.
 class Instances {
  public:
@@ -52,14 +52,14 @@ class Instances {
   // Puts the instances, all of them, at other places. After a failure there are none.
   void build(View<const lsp_instance> instances) {
     if (instances.size() > LSP_MAX_INSTANCES)
-      throw Failure(Exit::kLimit, "", std::to_string(instances.size()) + " instances are too many");
+      throw Error(LSP_ERROR_LIMIT, "", std::to_string(instances.size()) + " instances are too many");
     const auto count = static_cast<uint32_t>(instances.size());
     memory_.resize(lsp_instances_bytes(count) / sizeof(Block) + 1);
     lsp_error error;
     const lsp_status status =
         lsp_instances_build(assets_.data(), static_cast<uint32_t>(assets_.size()), instances.data(), count,
                             memory_.data(), memory_.size() * sizeof(Block), &view_, &error);
-    if (status != LSP_OK) throw Failure(static_cast<Exit>(status), "", error.message);
+    if (status != LSP_OK) throw Error(status, "", error.message);
   }
 
   // `rays` and `hits` are of one size. Adds to *counts unless it is null.
@@ -68,7 +68,7 @@ class Instances {
     lsp_error error;
     const lsp_status status =
         lsp_trace_instances(&view_, &options, mask, rays.data(), hits.data(), rays.size(), counts, &error);
-    if (status != LSP_OK) throw Failure(static_cast<Exit>(status), "", error.message);
+    if (status != LSP_OK) throw Error(status, "", error.message);
   }
 
   const lsp_instances& view() const { return view_; }  // good until the next build

@@ -25,7 +25,7 @@ extern "C" {
 /* LSP_LIBRARY_VERSION of the library that is linked. It fits this header where major and minor are the
  * header's. */
 LSP_API uint32_t lsp_version(void);
-/* What a function answers; the numbers are the programs' exit codes. */
+/* What a function answers. Other numbers may come. */
 typedef enum lsp_status {
   LSP_OK = 0,
   LSP_ERROR_FILE = 2,        /* the file cannot be read */

@@ -7,20 +7,20 @@
 #include <string>
 #include <utility>
 
+#include "lsp/error.hpp"
 #include "lsp/lsp.h"
-#include "lsp/program.h"
 
 namespace lsp {
 
 // Maps an .lsp file and opens it; a packed file is unpacked into memory first. Errors are thrown as
-// lsp::Failure with the file's name. The file may be hostile.
+// lsp::Error with the file's name. The file may be hostile.
 class SceneFile {
  public:
-  // A packed file whose raw form is larger than `memory_limit` bytes is refused (Exit::kLimit).
+  // A packed file whose raw form is larger than `memory_limit` bytes is refused (LSP_ERROR_LIMIT).
   explicit SceneFile(const std::string& path, uint64_t memory_limit = UINT64_MAX) {
     lsp_error error;
     const auto check = [&](lsp_status status) {
-      if (status != LSP_OK) throw Failure(static_cast<Exit>(status), path, error.message);
+      if (status != LSP_OK) throw Error(status, path, error.message);
     };
     check(lsp_map_file(path.c_str(), &mapping_.value, &error));
     const lsp_mapping& file = mapping_.value;
@@ -33,9 +33,9 @@ class SceneFile {
       check(status);  // not a packed file, or not a good one: what lsp_open said
     }
     if (raw > memory_limit) {
-      throw Failure(Exit::kLimit, path,
-                    "is packed and needs " + std::to_string(raw) + " bytes of memory, the limit is " +
-                        std::to_string(memory_limit) + "; bake it with --compress none");
+      throw Error(LSP_ERROR_LIMIT, path,
+                  "is packed and needs " + std::to_string(raw) + " bytes of memory, the limit is " +
+                      std::to_string(memory_limit) + "; bake it with --compress none");
     }
     // The strictest alignment a device may ask for, so that the unpacked bytes can be imported as a mapping
     // can.
@@ -43,8 +43,8 @@ class SceneFile {
     unpacked_.reset(
         std::aligned_alloc(kImportAlignment, (raw + kImportAlignment - 1) & ~(kImportAlignment - 1)));
     if (unpacked_ == nullptr) {
-      throw Failure(Exit::kLimit, path,
-                    "is packed and there is no memory for its " + std::to_string(raw) + " bytes");
+      throw Error(LSP_ERROR_LIMIT, path,
+                  "is packed and there is no memory for its " + std::to_string(raw) + " bytes");
     }
     check(lsp_unpack(file.bytes, file.size, unpacked_.get(), raw, &error));
     lsp_unmap_file(&mapping_.value);

@@ -15,9 +15,9 @@ int main(int argc, char** argv) {
   try {
     const lsp::SceneFile packed(argv[2]);
     if (!can_unpack || !packed.unpacked()) return 3;
-  } catch (const lsp::Failure& failure) {
-    if (can_unpack || failure.exit() != lsp::Exit::kUnsupported) return 4;
-    if (std::strstr(failure.what(), "LSP_PACKED") == nullptr) return 5;
+  } catch (const lsp::Error& error) {
+    if (can_unpack || error.status() != LSP_ERROR_UNSUPPORTED) return 4;
+    if (std::strstr(error.what(), "LSP_PACKED") == nullptr) return 5;
   }
   std::puts("embedded ok");
 }

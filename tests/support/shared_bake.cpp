@@ -1,4 +1,4 @@
-#include "test_bakes.h"
+#include "shared_bake.h"
 
 #include <fcntl.h>
 #include <sys/file.h>

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "random.h"
+#include "pcg32.h"
 #include "soup.h"
 
 namespace lsp::bench {

@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "random.h"
-#include "scene.h"
+#include "pcg32.h"
+#include "stress_scene.h"
 
 namespace lsp::stress {
 

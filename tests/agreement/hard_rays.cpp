@@ -1,4 +1,4 @@
-#include "rays.h"
+#include "hard_rays.h"
 
 #include <cmath>
 #include <limits>

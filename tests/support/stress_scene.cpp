@@ -1,10 +1,10 @@
-#include "scene.h"
+#include "stress_scene.h"
 
 #include <unistd.h>
 
 #include <algorithm>
 
-#include "random.h"
+#include "pcg32.h"
 #include "writer.h"
 
 namespace lsp::stress {

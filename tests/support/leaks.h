@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "random.h"
+#include "pcg32.h"
 #include "rays.h"
 
 namespace lsp::bench {

@@ -57,6 +57,8 @@ std::vector<Timing> race(const std::vector<Contender>& contenders, int warm_up, 
   return timings;
 }
 
+unsigned machine_threads() { return std::max(1u, std::thread::hardware_concurrency()); }
+
 double seconds_since_start() {
   static const Clock::time_point start = Clock::now();
   return since(start);

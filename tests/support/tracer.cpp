@@ -3,15 +3,11 @@
 #include <cstdio>
 #include <vector>
 
-#include "lsp/program.h"
+#include "lsp/failures.hpp"
 #include "timing.h"
 
 namespace lsp::bench {
 namespace {
-
-void check(lsp_status status, const lsp_error& error, const OpenFile& file) {
-  if (status != LSP_OK) throw Failure(static_cast<Exit>(status), file.path().string(), error.message);
-}
 
 class CpuTracer : public Tracer {
  public:
@@ -23,7 +19,7 @@ class CpuTracer : public Tracer {
       lsp_error error{};
       check(lsp_trace(&file_.scene(), &options, rays.data() + first, hits.data() + first, count, nullptr,
                       &error),
-            error, file_);
+            error, file_.path().string());
     });
   }
 
@@ -107,7 +103,7 @@ Work count_work(const OpenFile& file, const Mode& mode, std::span<const LspRay> 
   lsp_trace_counts counts{};
   lsp_error error{};
   check(lsp_trace(&file.scene(), &options, rays.data(), hits.data(), rays.size(), &counts, &error), error,
-        file);
+        file.path().string());
   const auto n = static_cast<double>(rays.empty() ? 1 : rays.size());
   return {static_cast<double>(counts.nodes) / n, static_cast<double>(counts.shafts) / n,
           static_cast<double>(counts.triangles) / n, static_cast<double>(counts.splits) / n,

@@ -20,6 +20,7 @@
 #include <string>
 #include <vector>
 
+#include "lsp/failures.hpp"
 #include "lsp/instances.hpp"
 #include "lsp/scene_file.hpp"
 
@@ -117,8 +118,8 @@ class InstancedScene {
           (std::filesystem::path(path_).parent_path() / names[i].get<std::string>()).string();
       try {
         assets_.push_back(std::make_unique<SceneFile>(asset, memory_limit));
-      } catch (const Failure& failure) {
-        throw Failure(failure.exit(), path_, place + ": " + asset + ": " + failure.what());
+      } catch (const Error& error) {
+        throw Failure(exit_of(error.status()), path_, place + ": " + asset + ": " + error.what());
       }
       asset_paths_.push_back(asset);
     }
@@ -173,15 +174,15 @@ class InstancedScene {
     try {
       instances_ = Instances(scenes, places_);
       return;
-    } catch (const Failure& failure) {
-      if (failure.exit() != Exit::kInvalid) throw Failure(failure.exit(), path_, failure.what());
+    } catch (const Error& error) {
+      if (error.status() != LSP_ERROR_INVALID) throw Failure(exit_of(error.status()), path_, error.what());
     }
     // Which one it is.
     for (size_t i = 0; i < places_.size(); ++i) {
       try {
         Instances(scenes, {&places_[i], 1});
-      } catch (const Failure& failure) {
-        const std::string what = failure.what(), before = "instance 0: its transform ";
+      } catch (const Error& error) {
+        const std::string what = error.what(), before = "instance 0: its transform ";
         fail("/instances/" + std::to_string(i) + "/transform",
              what.rfind(before, 0) == 0 ? what.substr(before.size()) : what);
       }
