@@ -35,7 +35,7 @@ void check(VkResult result, const char* what) {
 void check(lsp_status status, const lsp_error& error, const char* file) {
   if (status == LSP_OK) return;
   std::fprintf(stderr, "hello_vulkan: %s: %s\n", file, error.message);
-  std::exit(status);
+  std::exit(3);
 }
 
 struct Buffer {

@@ -15,8 +15,8 @@ bool read_color(std::string_view line, glm::vec3& color) {
   double value[3];
   int count = 0;
   for (std::string_view word; count < 3 && take_word(line, word); ++count) value[count] = number_of(word);
-  if (count == 0 || !std::isfinite(value[0])) return false;
-  if (count < 3) value[1] = value[2] = value[0];
+  if ((count != 1 && count != 3) || !std::isfinite(value[0])) return false;
+  if (count == 1) value[1] = value[2] = value[0];
   if (!std::isfinite(value[1]) || !std::isfinite(value[2])) return false;
   color = glm::vec3(value[0], value[1], value[2]);
   return true;
