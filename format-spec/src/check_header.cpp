@@ -181,7 +181,7 @@ void check_limits(const LspHeader& header, Report& report) {
     LSP_HEADER_FINDING(kDepthBound, max_depth,
                        "is " + std::to_string(header.max_depth) + ", the limit is 96");
   const uint64_t steps = is_ntree(header)     ? lsp_ntree_steps(&header)
-                         : walks_wide(header) ? 9 * uint64_t{header.wide_node_count}
+                         : walks_wide(header) ? lsp_wide_steps(&header)
                                               : 2 * uint64_t{header.node_count};
   if (header.max_steps > steps + kStepsSlack)
     LSP_HEADER_FINDING(kStepsBound, max_steps,
@@ -262,7 +262,10 @@ void check_identification(const FileView& view, Report& report) {
     return;
   }
   if (header.magic_0 != LSP_MAGIC_0 || header.magic_1 != LSP_MAGIC_1) {
-    report.add(RuleId::kBadMagic, 0, 8, "/header/magic_0", "this is not an .lsp file");
+    const bool part = header.magic_0 == LSP_MAGIC_0 && header.magic_1 == kPartMagic;
+    report.add(RuleId::kBadMagic, 0, 8, "/header/magic_0",
+               part ? "this is a part of a bake; lsp-merge makes an .lsp file of all parts"
+                    : "this is not an .lsp file");
     return;
   }
   if (header.version_major != LSP_VERSION_MAJOR) {

@@ -308,7 +308,9 @@ Json summarize(std::span<const std::byte> file, const std::string& name, uint64_
   if (report.verdict() == Verdict::kUnsupported)
     throw Failure(Exit::kUnsupported, name,
                   "has a version or features that this program does not know: use a newer one");
-  if (report.fatal()) throw Failure(Exit::kInvalid, name, "is not an .lsp file");
+  if (report.fatal())
+    throw Failure(Exit::kInvalid, name,
+                  "is not an .lsp file: " + report.findings().begin()->second.examples.front().message);
   check_sections(view, report);
   check_hashes_and_codec(view, memory_limit, report);
 

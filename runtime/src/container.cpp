@@ -18,8 +18,8 @@ using format::is_ntree;
 using format::is_wide;
 using format::Kind;
 using format::kKinds;
+using format::kPartMagic;
 
-constexpr uint32_t kPartMagic = 0x54524150u;  // "PART": what lsp-bake --shard writes, in place of LSP_MAGIC_1
 constexpr uint64_t kPackedAlignment = 256;
 constexpr uint32_t kMaxAlignment = 65536;
 constexpr uint64_t kStepsSlack = 16;

@@ -133,6 +133,11 @@ TEST_F(LspMerge, SaysWhatIsWrong) {
   expect("1.part moved.part -o a.lsp", 3, "moved.part: is not of the same bake as 1.part, inputs is ");
   expect("1.part packed.part -o a.lsp", 3, "packed.part: is not of the same bake as 1.part, their options");
   EXPECT_FALSE(fs::exists(folder_ / "a.lsp"));
+  for (const char* reader : {"lsp-validate ", "lsp-info ", "lsp-trace --rays a --hits b "}) {
+    EXPECT_EQ(shell(reader + std::string("1.part")), 3) << reader;
+    EXPECT_NE((read("out") + read("err")).find("is a part of a bake; lsp-merge makes"), std::string::npos)
+        << reader;
+  }
   for (const char* refused : {"3/2", "0/2", "2", "1/2 --base bvh", "1/2 --depth 4", "1/2 --max-size 1MB"}) {
     EXPECT_EQ(shell(std::string("lsp-bake object.obj -o a.part --shard ") + refused), 1) << refused;
     EXPECT_NE(read("err").find("--shard"), std::string::npos) << read("err");

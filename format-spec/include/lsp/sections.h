@@ -8,6 +8,9 @@
 
 namespace lsp::format {
 
+// "PART", which what lsp-bake --shard writes has in place of LSP_MAGIC_1.
+constexpr uint32_t kPartMagic = 0x54524150u;
+
 // The sections that this version knows, in the order of the file.
 enum class Kind {
 #define LSP_ARRAY_SECTION(Name, ...) k##Name,
