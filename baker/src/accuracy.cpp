@@ -10,7 +10,7 @@ namespace lsp {
 bool weigh_tables(Baked& baked) {
   // Balanced has to gain on a device. On the CPU it may lose in large scenes where fast gains much, but small
   // things stay small.
-  constexpr Gain kWorth = {1.05, 0.97, 1.05, 1.5};
+  constexpr double kVulkan = 1.05, kCpu = 0.97, kCpuFast = 1.5;
   constexpr uint64_t kSmall = 4000000;  // bytes of exact data
   if (double(table_bytes(baked) + kTablePadding) > kTableShare * double(exact_bytes(baked))) {
     leave_out_tables(baked,
@@ -18,9 +18,10 @@ bool weigh_tables(Baked& baked) {
                      "asks for them)");
     return true;
   }
-  const Gain& gain = baked.gain;
-  if (gain.vulkan < kWorth.vulkan || gain.fast_vulkan < kWorth.fast_vulkan ||
-      (gain.cpu < kWorth.cpu && (exact_bytes(baked) < kSmall || gain.fast_cpu < kWorth.fast_cpu))) {
+  const QualityFigures &balanced = baked.qualities[LSP_QUALITY_BALANCED],
+                       &fast = baked.qualities[LSP_QUALITY_FAST];
+  if (balanced.vulkan < kVulkan || fast.vulkan < kVulkan ||
+      (balanced.cpu < kCpu && (exact_bytes(baked) < kSmall || fast.cpu < kCpuFast))) {
     leave_out_tables(baked,
                      "a ray through them would take as long as an exact one (--base cells asks for them)");
     return true;

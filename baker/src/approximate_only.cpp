@@ -260,6 +260,7 @@ void keep_tables_only(Baked& baked) {
   baked.triangles = std::move(triangles);
   baked.normals = std::move(normals);
   baked.wide = {};
+  baked.qualities.fill(baked.qualities[LSP_QUALITY_FAST]);  // tables alone are left
   tables.nodes.clear();
   tables.references.clear();
   for (LspFilledCell& cell : tables.cells) {
@@ -281,6 +282,7 @@ void leave_out_tables(Baked& baked, const std::string& reason) {
   LspHeader& h = baked.header;
   h.cells = {};
   for (uint32_t& dial : h.quality) dial = 0;
+  baked.qualities = {};
   h.base_structure = LSP_BASE_WIDE;
   h.required_features = (h.required_features & ~LSP_FEATURE_CELLS) | LSP_FEATURE_WIDE | LSP_FEATURE_WIDE_BASE;
   set_counts(baked);

@@ -1,6 +1,7 @@
 // From a mesh to the sections of an .lsp file.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -50,12 +51,17 @@ struct BakeOptions {
       folder;  // where Line Spaces that the limit has no room for go meanwhile; empty: nowhere
 };
 
-// How many times as fast as exact rays those are that cells answer, at the qualities "balanced" and "fast",
-// by what they count: an estimate.
-struct Gain {
-  double vulkan = 0, cpu = 0;            // balanced
-  double fast_vulkan = 0, fast_cpu = 0;  // fast
+// What a quality of cells errs and gains, as the bake measured it on rays of its own: the worst of rays from
+// the surfaces, of rays from what eyes in the scene see, and of ten of twelve small pictures (dial.h).
+struct QualityFigures {
+  double wrong = 0;      // share of the rays that hit or miss wrongly
+  double depth = 0;      // mean error of the distance where both hit, in diagonals
+  double occlusion = 0;  // mean error of ambient occlusion, over its mean or 0.25
+  double light = 0;      // of the light that surfaces send back, without shadows, over its mean
+  // How many times as fast as exact rays, by what they count: an estimate; 0: nothing was measured.
+  double vulkan = 0, cpu = 0;
 };
+using Qualities = std::array<QualityFigures, LSP_QUALITY_COUNT>;  // LSP_QUALITY_*
 
 // The sections of a file, and the header but for what the writer knows (sizes, offsets, hashes).
 struct Baked {
@@ -70,7 +76,7 @@ struct Baked {
   std::vector<LspMaterial> materials;     // empty: no section
   LineSpaces line_spaces;
   std::vector<std::string> skipped;  // what the scene did not need, in words
-  Gain gain;                         // of cells with exact data
+  Qualities qualities{};             // of cells that were baked with exact data
   double tree_seconds = 0;
   double line_space_seconds = 0;
 };

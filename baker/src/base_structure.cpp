@@ -138,7 +138,7 @@ void fill_cells(BakeJob& job) {
                           with_commas(cells));
 }
 
-void finish_cells(BakeJob& job) { job.baked.gain = choose_dial(job.baked, job.options.cells_wrong); }
+void finish_cells(BakeJob& job) { choose_dial(job.baked, job.options.cells_wrong); }
 
 void build_wide_base(BakeJob& job) { job.baked.header.base_structure = LSP_BASE_WIDE; }
 

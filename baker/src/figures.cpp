@@ -1,6 +1,7 @@
 #include "figures.h"
 
 #include <cinttypes>
+#include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -41,6 +42,33 @@ Json to_json(const MeasuredError& e) {
           {"depth_error_percent_of_diagonal", 100 * e.depth_error}};
 }
 
+namespace {
+
+struct NamedQuality {
+  const char* name;
+  uint32_t quality;
+};
+constexpr NamedQuality kQualities[] = {
+    {"fast", LSP_QUALITY_FAST}, {"balanced", LSP_QUALITY_BALANCED}, {"accurate", LSP_QUALITY_ACCURATE}};
+
+bool is_measured(const Qualities& qualities) { return qualities[LSP_QUALITY_FAST].cpu > 0; }
+
+}  // namespace
+
+Json to_json(const Qualities& qualities) {
+  if (!is_measured(qualities)) return nullptr;
+  Json list;
+  for (const auto& [name, quality] : kQualities) {
+    const QualityFigures& q = qualities[quality];
+    list[name] = {{"wrong_percent", 100 * q.wrong},
+                  {"depth_error_percent_of_diagonal", 100 * q.depth},
+                  {"ambient_occlusion_error_percent", 100 * q.occlusion},
+                  {"light_error_percent", 100 * q.light},
+                  {"estimated_times_exact_rays", {{"vulkan", q.vulkan}, {"cpu", q.cpu}}}};
+  }
+  return list;
+}
+
 Json to_json(const std::vector<WrittenSection>& sections) {
   Json list = Json::array();
   for (const WrittenSection& s : sections)
@@ -49,11 +77,27 @@ Json to_json(const std::vector<WrittenSection>& sections) {
 }
 
 void print_error(const MeasuredError& error) {
-  if (error.rays)
+  if (error.rays == 0) return;
+  const double wrong = error.wrong_share();
+  std::printf(
+      "error       %.2f %% wrong hits, %.2f %% wrong misses (both +-%.2f %%, 95 %% of the time), depth off "
+      "by "
+      "%.2f %% of the diagonal\n",
+      100.0 * double(error.wrong_hits) / double(error.rays),
+      100.0 * double(error.wrong_misses) / double(error.rays),
+      196 * std::sqrt(wrong * (1 - wrong) / double(error.rays)), 100 * error.depth_error);
+}
+
+void print_qualities(const Qualities& qualities) {
+  if (!is_measured(qualities)) return;
+  for (const auto& [name, quality] : kQualities) {
+    const QualityFigures& q = qualities[quality];
     std::printf(
-        "error       %.2f %% wrong hits, %.2f %% wrong misses, depth off by %.2f %% of the diagonal\n",
-        100.0 * double(error.wrong_hits) / double(error.rays),
-        100.0 * double(error.wrong_misses) / double(error.rays), 100 * error.depth_error);
+        "%-11s %.1f %% wrong, depth off by %.1f %%, ambient occlusion by %.1f %%, light by %.1f %%; about "
+        "%.1fx "
+        "exact rays on Vulkan, %.1fx on the CPU\n",
+        name, 100 * q.wrong, 100 * q.depth, 100 * q.occlusion, 100 * q.light, q.vulkan, q.cpu);
+  }
 }
 
 void print_sections(const std::vector<WrittenSection>& sections) {

@@ -24,8 +24,12 @@ nlohmann::ordered_json to_json(const MeasuredError& error);
 
 nlohmann::ordered_json to_json(const std::vector<WrittenSection>& sections);
 
+// Null where nothing was measured.
+nlohmann::ordered_json to_json(const Qualities& qualities);
+
 // For people, on standard output: nothing where nothing was measured.
 void print_error(const MeasuredError& error);
+void print_qualities(const Qualities& qualities);
 void print_sections(const std::vector<WrittenSection>& sections);
 
 }  // namespace lsp

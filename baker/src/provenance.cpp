@@ -84,6 +84,7 @@ Json provenance(const Arguments& a, const Baked& baked, const Mesh& mesh,
                  {"collapsed", mesh.rejected.collapsed},
                  {"invisible", mesh.rejected.invisible}}},
                {"error", to_json(error)},
+               {"qualities", to_json(baked.qualities)},
                {"materials", material_names}};
   if (a.time) {
     meta["options"]["time"] = *a.time;

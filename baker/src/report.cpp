@@ -40,6 +40,7 @@ Json report_json(const BakeReport& done, const Json& meta) {
           {"notes", done.mesh.notes},
           {"skipped", baked.skipped},
           {"error", meta["error"]},
+          {"qualities", meta["qualities"]},
           {"nodes", nodes_of(baked.header)},
           {"triangle_records", baked.header.triangle_count},
           {"partial_records", partial_records(baked)},
@@ -86,6 +87,7 @@ void print_report(const BakeReport& done) {
     std::printf("Line Spaces %u, %.1f %% of the shafts filled\n", baked.header.line_space_count,
                 100.0 * double(ls.filled) / double(std::max<uint64_t>(1, ls.shafts)));
   print_error(done.error);
+  print_qualities(baked.qualities);
   for (const std::string& s : baked.skipped) std::printf("skipped     %s\n", s.c_str());
   std::printf("time        import %.2f s, tree %.2f s, Line Spaces %.2f s, write %.2f s; peak memory %s\n",
               done.import_seconds, baked.tree_seconds, baked.line_space_seconds, done.write_seconds,

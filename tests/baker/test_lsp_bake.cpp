@@ -163,7 +163,39 @@ TEST_F(LspBake, PrintsOneJsonObject) {
   EXPECT_EQ(report["triangles"]["read"], 7200);
   EXPECT_EQ(report["file_bytes"], fs::file_size(folder_ / "a.lsp"));
   EXPECT_EQ(report["error"]["rays"], 65536);
+  EXPECT_TRUE(report["qualities"].is_null()) << "Line Spaces have none";
   EXPECT_EQ(read("err"), "");
+}
+
+TEST_F(LspBake, StatesWhatItsQualitiesErrAndGain) {
+  ASSERT_EQ(run("grid.obj -o a.lsp --cells 6 --json"), 0) << read("err");
+  const auto qualities = nlohmann::ordered_json::parse(read("out"))["qualities"];
+  for (const char* measure : {"wrong_percent", "depth_error_percent_of_diagonal",
+                              "ambient_occlusion_error_percent", "light_error_percent"}) {
+    EXPECT_GE(qualities["fast"][measure], qualities["balanced"][measure]) << measure;
+    EXPECT_GE(qualities["balanced"][measure], qualities["accurate"][measure]) << measure;
+  }
+  EXPECT_LE(qualities["balanced"]["ambient_occlusion_error_percent"], 3.0);
+  EXPECT_LE(qualities["accurate"]["ambient_occlusion_error_percent"], 1.5);
+  const auto gain = [&](const char* quality, const char* device) {
+    return double{qualities[quality]["estimated_times_exact_rays"][device]};
+  };
+  for (const char* device : {"vulkan", "cpu"}) {
+    EXPECT_GE(gain("fast", device), gain("balanced", device)) << device;
+    EXPECT_GE(gain("balanced", device), gain("accurate", device)) << device;
+    EXPECT_GT(gain("accurate", device), 0) << device;
+  }
+
+  EXPECT_NE(read("a.lsp").find("\"qualities\":" + qualities.dump()), std::string::npos)
+      << "META has them, too";
+
+  ASSERT_EQ(run("grid.obj -o tables.lsp --cells 6 --no-exact --json"), 0) << read("err");
+  const auto alone = nlohmann::json::parse(read("out"))["qualities"];
+  EXPECT_EQ(alone["accurate"], alone["fast"]) << "tables alone are left";
+  ASSERT_EQ(run("grid.obj -o wide.lsp --base wide --json"), 0) << read("err");
+  EXPECT_TRUE(nlohmann::json::parse(read("out"))["qualities"].is_null()) << "every ray is exact";
+  ASSERT_EQ(run("grid.obj -o a.lsp --cells 6"), 0) << read("err");
+  EXPECT_NE(read("out").find("exact rays on Vulkan"), std::string::npos) << read("out");
 }
 
 TEST_F(LspBake, ExitsAsTheErrorIs) {

@@ -69,7 +69,7 @@ Baked scene(const Shard& shard) {
 
 PartSettings settings() {
   PartSettings s;
-  s.meta = {{"source_hash", "0"}, {"options", {{"cells", 2}}}, {"error", nullptr}};
+  s.meta = {{"source_hash", "0"}, {"options", {{"cells", 2}}}, {"error", nullptr}, {"qualities", nullptr}};
   return s;
 }
 

@@ -126,15 +126,24 @@ class Dial {
     for (Rays& set : sets_) set.truth = trace(scene_, {0, 0, 0, 0}, set.rays, &set.counts);
   }
 
-  // Over all rays, with the header's qualities.
-  Gain gain() const {
-    const lsp_trace_counts at_balanced = work(LSP_QUALITY_BALANCED), at_fast = work(LSP_QUALITY_FAST);
-    lsp_trace_counts exact{};
-    for (const Rays& set : sets_) lsp_add_counts(&exact, &set.counts);
+  // Of a quality as the header states it: the worst error of any set, and the gain over all rays.
+  QualityFigures figures(uint32_t quality) const {
+    QualityFigures out;
+    lsp_trace_counts exact{}, cells{};
+    for (const Rays& set : sets_) {
+      const DialError error = measure(set, quality);
+      out.wrong = std::max(out.wrong, error.wrong);
+      out.depth = std::max(out.depth, error.depth);
+      out.occlusion = std::max(out.occlusion, error.picture);
+      out.light = std::max(out.light, error.light);
+      lsp_add_counts(&exact, &set.counts);
+      lsp_add_counts(&cells, &error.counts);
+    }
     if (exact.rays == 0) return {};
     const Costs cpu = cpu_costs(exact_bytes_);
-    return {kVulkan.exact(exact) / kVulkan.cells(at_balanced), cpu.exact(exact) / cpu.cells(at_balanced),
-            kVulkan.exact(exact) / kVulkan.cells(at_fast), cpu.exact(exact) / cpu.cells(at_fast)};
+    out.vulkan = kVulkan.exact(exact) / kVulkan.cells(cells);
+    out.cpu = cpu.exact(exact) / cpu.cells(cells);
+    return out;
   }
 
   // The cheapest dial that keeps within errors, or the finest. The more of the origin tables is heeded, the
@@ -150,7 +159,7 @@ class Dial {
       double cost = 0;
       bool kept = true;
       for (const Rays& set : sets_) {
-        const DialError error = measure(set);
+        const DialError error = measure(set, LSP_QUALITY_BALANCED);
         cost = std::max(cost, kVulkan.cells(error.counts));
         kept = kept && within(error, wrong);
         if (!kept) break;
@@ -196,16 +205,6 @@ class Dial {
     return sum / kPerPoint;
   }
 
-  // Of all rays.
-  lsp_trace_counts work(uint32_t quality) const {
-    lsp_trace_options options{};
-    options.flags = LSP_TRACE_APPROXIMATE;
-    options.quality = quality;
-    lsp_trace_counts counts{};
-    for (const Rays& set : sets_) trace(scene_, options, set.rays, &counts);
-    return counts;
-  }
-
   // The error of all views but the two worst of twelve: they may look where tables know nothing, and nobody
   // else should pay for it.
   static constexpr size_t kSpared = 2;
@@ -227,9 +226,12 @@ class Dial {
     return open.off / std::max(0.25 * view.pixels, open.truth);
   }
 
-  DialError measure(const Rays& set) const {
+  DialError measure(const Rays& set, uint32_t quality) const {
     DialError error;
-    const std::vector<LspHit> hits = trace(scene_, {LSP_TRACE_APPROXIMATE, 0, 0, 0}, set.rays, &error.counts);
+    lsp_trace_options options{};
+    options.flags = LSP_TRACE_APPROXIMATE;
+    options.quality = quality;
+    const std::vector<LspHit> hits = trace(scene_, options, set.rays, &error.counts);
     size_t wrong = 0, both = 0;
     double depth = 0;
     for (size_t i = 0; i < hits.size(); ++i) {
@@ -264,15 +266,17 @@ class Dial {
 
 }  // namespace
 
-Gain choose_dial(Baked& baked, double wrong) {
+void choose_dial(Baked& baked, double wrong) {
   LspHeader& h = baked.header;
+  baked.qualities = {};
   for (uint32_t& dial : h.quality) dial = LSP_DIAL_TABLES;
-  if (baked.cell_tables.references.empty()) return {};
+  if (baked.cell_tables.references.empty()) return;
   Dial dial(baked);
   const uint32_t accurate = dial.cheapest(0.5 * wrong);
   h.quality[LSP_QUALITY_BALANCED] = dial.cheapest(wrong);
   h.quality[LSP_QUALITY_ACCURATE] = accurate;
-  return dial.gain();
+  for (uint32_t quality = 0; quality < LSP_QUALITY_COUNT; ++quality)
+    baked.qualities[quality] = dial.figures(quality);
 }
 
 }  // namespace lsp

@@ -8,8 +8,8 @@ namespace lsp {
 // Measures the dial, on rays that trained nothing, from the surfaces and from what eyes in the scene see, and
 // writes header.quality: fast answers from tables alone, balanced errs at most `wrong` (a share) of the rays,
 // as much in depth, three times as much in ambient occlusion and four times as much in the light that
-// surfaces send back, accurate half of that; each is the cheapest dial that does, or the finest. Returns what
-// balanced gains; nothing without exact data.
-Gain choose_dial(Baked& baked, double wrong);
+// surfaces send back, accurate half of that; each is the cheapest dial that does, or the finest. Writes
+// baked.qualities; without exact data there is nothing to measure.
+void choose_dial(Baked& baked, double wrong);
 
 }  // namespace lsp

@@ -46,6 +46,7 @@ Json report_json(const Arguments& a, const Merged& done) {
             {"splits", h.split_count}}},
           {"skipped", done.baked.skipped},
           {"error", to_json(done.error)},
+          {"qualities", to_json(done.baked.qualities)},
           {"seconds",
            {{"read", done.read_seconds},
             {"join", done.join_seconds},
@@ -64,6 +65,7 @@ void print_report(const Arguments& a, const Merged& done) {
               h.cells.cells_z, h.filled_cell_count, h.split_count, h.plane_count);
   for (const std::string& skipped : done.baked.skipped) std::printf("skipped     %s\n", skipped.c_str());
   print_error(done.error);
+  print_qualities(done.baked.qualities);
   std::printf("time        read %.2f s, join %.2f s, dial %.2f s, write %.2f s; peak memory %s\n",
               done.read_seconds, done.join_seconds, done.dial_seconds, done.write_seconds,
               size_text(peak_memory_bytes()).c_str());
@@ -73,7 +75,7 @@ void print_report(const Arguments& a, const Merged& done) {
 
 // What bake() and lsp-bake do once the tables are there. `file` is named where they err more than they may.
 MeasuredError finish(Baked& baked, PartSettings& settings, const std::string& file) {
-  baked.gain = choose_dial(baked, settings.accuracy.wrong);
+  choose_dial(baked, settings.accuracy.wrong);
   if (settings.accuracy.weighed && weigh_tables(baked)) {
     settings.meta["options"]["base"] = "wide";
     settings.meta["options"]["cells"] = 0;
@@ -116,6 +118,7 @@ Exit run(const Arguments& a) {
   bar.show("dial", 0);
   done.error = finish(done.baked, settings, a.parts.front().string());
   settings.meta["error"] = to_json(done.error);
+  settings.meta["qualities"] = to_json(done.baked.qualities);
   done.dial_seconds = timer();
 
   bar.show("write", 0);

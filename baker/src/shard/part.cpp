@@ -86,7 +86,8 @@ PartSettings settings_of(const std::string& text, const std::string& file) {
     const uint32_t align = s.write.alignment;
     const bool good = (align == 0 || align == 256 || align == 4096 || align == 65536) &&
                       s.accuracy.wrong >= 0 && s.accuracy.max_error >= 0 &&
-                      s.meta.at("options").is_object() && s.meta.contains("error");
+                      s.meta.at("options").is_object() && s.meta.contains("error") &&
+                      s.meta.contains("qualities");
     if (good && text_of(s) == text) return s;
   } catch (const Json::exception&) {
   }
