@@ -78,7 +78,7 @@ extern "C" lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options*
   const bool any_hit = (flags & LSP_TRACE_ANY_HIT) != 0;
   if (approximate && (features & LSP_FEATURE_CELLS) != 0) {
 #ifdef LSP_SIMD
-    const bool wide = !partial && counts == nullptr && count >= lsp::kFewRays;
+    const bool wide = counts == nullptr && count >= lsp::kFewRays;
     if (const lsp::WideCells* loop = wide ? lsp::wide_cells(*scene) : nullptr; loop != nullptr) {
       loop->trace(*scene, flags, lsp_dial(scene, options), rays, hits, count);
       return LSP_OK;
@@ -90,8 +90,7 @@ extern "C" lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options*
   }
   if ((features & LSP_FEATURE_WIDE) != 0) {
 #ifdef LSP_SIMD
-    if (const lsp::WideExact* loop = !partial && counts == nullptr ? lsp::wide_exact() : nullptr;
-        loop != nullptr) {
+    if (const lsp::WideExact* loop = counts == nullptr ? lsp::wide_exact() : nullptr; loop != nullptr) {
       loop->trace(*scene, flags, rays, hits, count);
       return LSP_OK;
     }

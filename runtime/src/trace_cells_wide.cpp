@@ -51,6 +51,7 @@ struct Tracer {
   const uint32_t dial;
   const uint32_t flags;
   const bool any_hit;
+  const bool partial;  // some triangles are there in part
   Arrays arrays;
 
   // A value a lane, of rays under way: the first `n`.
@@ -83,6 +84,7 @@ struct Tracer {
         dial(dial),
         flags(flags),
         any_hit((flags & LSP_TRACE_ANY_HIT) != 0),
+        partial((scene.header->required_features & LSP_FEATURE_COVERAGE) != 0),
         arrays{or_zero(scene.filled_cells, scene.header->filled_cell_count),
                or_zero(scene.planes, scene.header->plane_count),
                or_zero(scene.splits, scene.header->split_count),
@@ -475,7 +477,6 @@ struct Tracer {
     hit = select(hn::Gt(hit, t_to), t_to, hit);
     const Bits hit_bits = bits_of(hn::And(met, hn::And(hn::Gt(hit, tmin), hn::Lt(hit, load(tmax_ + i)))));
     if (hit_bits == 0) return;
-    over |= hit_bits << i;
     HWY_ALIGN float hit_t[kLanes];
     hn::Store(hit, df, hit_t);
     LSP_FOR_BITS(k, hit_bits) {
@@ -483,8 +484,36 @@ struct Tracer {
       best.t = hit_t[k];
       best.triangle = lsp_load_plane_record(scene, plane[i + k]);
       best.flags = LSP_HIT_LINE_SPACE | (axis_[i + k] < 0 ? LSP_HIT_ORIGIN_INSIDE : 0u);
-      add_found(ray_[i + k], best);
+      if (partial && Text::lsp_has_gaps(lsp_load_triangle(scene, best.triangle))) [[unlikely]] {
+        meet_in_part(i + k, best);
+      } else {
+        over |= Bits{1} << (i + k);
+        add_found(ray_[i + k], best);
+      }
     }
+  }
+
+  // A plane of a triangle that is there in part: the cell is traced exactly; from tables alone the ray either
+  // meets it or goes on.
+  HWY_NOINLINE void meet_in_part(size_t k, const Text::LspBest& plane) {
+    if (dial == LSP_DIAL_TABLES) {
+      if (is_passed<Text>(lsp_load_triangle(scene, plane.triangle), rays[ray_[k]])) return;
+      over |= Bits{1} << k;
+      add_found(ray_[k], plane);
+      return;
+    }
+    ExactTrace& trace = turns[0];
+    trace.begin(scene, rays[ray_[k]], static_cast<uint32_t>(k), index[k],
+                {cell_[0][k], cell_[1][k], cell_[2][k]}, t_[k], t_out[k]);
+    while (trace.descend(scene) && trace.test(scene, any_hit)) {
+    }
+    end_exactly(trace);
+  }
+
+  void end_exactly(const ExactTrace& trace) {
+    if (trace.best().triangle == LSP_NONE) return;
+    over |= Bits{1} << trace.lane();
+    add_found(ray_[trace.lane()], trace.best());
   }
 
   HWY_INLINE void add_found(uint32_t number, const Text::LspBest& best) {
@@ -517,10 +546,7 @@ struct Tracer {
         ExactTrace* trace = on[k];
         bool goes_on = trace->test(scene, any_hit) && trace->descend(scene);
         if (!goes_on) {
-          if (trace->best().triangle != LSP_NONE) {
-            over |= Bits{1} << trace->lane();
-            add_found(ray_[trace->lane()], trace->best());
-          }
+          end_exactly(*trace);
           goes_on = begin_one(trace);
         }
         if (goes_on) on[kept++] = trace;

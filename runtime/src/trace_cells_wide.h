@@ -5,7 +5,7 @@
 
 namespace lsp {
 
-// One vector instruction set, and the loop compiled for it. The bits are those of solid::trace_cells.
+// One vector instruction set, and the loop compiled for it. The bits are those of trace_cells.
 struct WideCells {
   const char* name;
   bool (*runs_here)();  // on this CPU
@@ -19,8 +19,7 @@ constexpr uint64_t kFewRays = 16;
 // All that are compiled in, the best first, and a last one whose name is null.
 extern const WideCells kWideCells[];
 
-// The best that runs here, for a scene whose triangles are solid. Null: none does, or the scene is too large
-// for it.
+// The best that runs here. Null: none does, or the scene is too large for it.
 const WideCells* wide_cells(const lsp_scene& scene);
 
 }  // namespace lsp

@@ -1,6 +1,5 @@
-// Exact rays of a scene with wide nodes, one after the other: those that are counted, those of scenes with
-// triangles that are there in part, and all where there are no vectors. The others go through
-// trace_wide_lanes.cpp.
+// Exact rays of a scene with wide nodes, one after the other: those that are counted, and all where there are
+// no vectors. The others go through trace_wide_lanes.cpp.
 #include "trace_group.h"
 #include "trace_variant.h"
 

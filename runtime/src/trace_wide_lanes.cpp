@@ -98,8 +98,9 @@ struct Ready {
   const float *origin, *shear, *direction;
   size_t axis;
   Bytes rotation;
+  const LspRay* given;
 
-  HWY_INLINE Ready(const Batch& b, size_t i)
+  HWY_INLINE Ready(const Batch& b, size_t i, const LspRay& ray)
       : inverse(hn::LoadDup128(d8, b.inverse[i])),
         first_base(hn::LoadDup128(d8, b.first_base[i])),
         last_base(hn::LoadDup128(d8, b.last_base[i])),
@@ -112,7 +113,8 @@ struct Ready {
         shear(b.shear[i]),
         direction(b.direction[i]),
         axis(b.axis[i]),
-        rotation(hn::Load(hn::Repartition<uint8_t, D4>(), kRotations[axis])) {}
+        rotation(hn::Load(hn::Repartition<uint8_t, D4>(), kRotations[axis])),
+        given(&ray) {}
 
   // As given, scaled.
   HWY_INLINE vec3 unrotated() const {
@@ -154,7 +156,7 @@ class Tracer {
       make_ready(rays + first, here);
       for (size_t i = 0; i < here; ++i)
         hits[first + i] = (batch_.ready >> i & 1u) != 0
-                              ? trace_one<kAny>(rays[first + i], Ready(batch_, i), flags)
+                              ? trace_one<kAny>(rays[first + i], Ready(batch_, i, rays[first + i]), flags)
                               : trace_singly(rays[first + i], flags);
     }
   }
@@ -176,7 +178,8 @@ class Tracer {
   // Invalid rays, and those whose products may overflow.
   LspHit trace_singly(const LspRay& ray, uint32_t flags) const {
     LspHit hit;
-    solid::trace_wide(scene_, flags, 0, &ray, &hit, 1, nullptr);
+    const bool partial = (scene_.header->required_features & LSP_FEATURE_COVERAGE) != 0;
+    (partial ? partial::trace_wide : solid::trace_wide)(scene_, flags, 0, &ray, &hit, 1, nullptr);
     return hit;
   }
 
@@ -358,8 +361,8 @@ class Tracer {
       triangles = copy_last(first, copies);
     const LspTriangle* const records[kLeafLanes] = {triangles, triangles + 1, triangles + 2, triangles + 3};
     const auto number_of = [&](uint32_t lane) HWY_ATTR { return first + lane; };
-    hit_triangles(scene_, records, count, {r.origin, r.shear, r.direction, r.tmin, r.rotation}, number_of,
-                  best);
+    hit_triangles<Text>(scene_, records, count, {r.origin, r.shear, r.direction, r.tmin, r.rotation, r.given},
+                        number_of, best);
   }
 
   // The file's last triangles, from `first` on, and as many more as make four.

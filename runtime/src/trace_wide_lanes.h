@@ -5,7 +5,7 @@
 
 namespace lsp {
 
-// One vector instruction set, and the loop compiled for it. The bits are those of solid::kWideLoops.
+// One vector instruction set, and the loop compiled for it. The bits are those of trace_wide.
 struct WideExact {
   const char* name;
   bool (*runs_here)();  // on this CPU
@@ -15,7 +15,7 @@ struct WideExact {
 // All that are compiled in, the best first, and a last one whose name is null.
 extern const WideExact kWideExact[];
 
-// The best that runs here; scenes with triangles that are there in part are not for it. Null: none does.
+// The best that runs here. Null: none does.
 const WideExact* wide_exact();
 
 }  // namespace lsp

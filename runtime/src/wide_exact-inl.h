@@ -26,6 +26,7 @@ class ExactTrace {
   HWY_INLINE void begin(const lsp_scene& scene, const LspRay& ray, uint32_t lane, uint32_t index,
                         const ivec3& cell, float t_in, float t_out) {
     lane_ = lane;
+    ray_ = &ray;
     set_ray(scene, ray, t_in, t_out);
     set_slabs(scene.header->cells, cell);
     tree_ = lsp_load_cell_tree(scene, index);
@@ -84,7 +85,8 @@ class ExactTrace {
     }
     const Bytes rotation = hn::Load(hn::Repartition<uint8_t, D4>(), kRotations[axis_]);
     const auto number_of = [&](uint32_t lane) HWY_ATTR { return numbers[lane]; };
-    hit_triangles(scene, records, count_, {rows_[0], rows_[1], rows_[2], tmin_, rotation}, number_of, best_);
+    hit_triangles<Text>(scene, records, count_, {rows_[0], rows_[1], rows_[2], tmin_, rotation, ray_},
+                        number_of, best_);
     if (top_ <= 1 || (any_hit && best_.triangle != LSP_NONE)) return false;
     ref_ = stack_[--top_];
     return true;
@@ -179,6 +181,7 @@ class ExactTrace {
   V4 inverse_, origin_plus_, origin_minus_;
   float tmin_;
   uint32_t axis_, lane_;
+  const LspRay* ray_;
   Text::LspBest best_;
   LspFilledCell tree_;
   uint32_t ref_, top_, step_, first_, count_;

@@ -105,13 +105,24 @@ struct RayRows {
   const float *origin, *shear, *direction;
   float tmin;
   Bytes rotation;
+  const LspRay* given;
 };
 
+// Whether a triangle is not there for this ray; of most nothing is asked.
+template <class Text>
+HWY_INLINE bool is_passed(const LspTriangle& triangle, const LspRay& ray) {
+  if (!Text::lsp_has_gaps(triangle)) [[likely]]
+    return false;
+  typename Text::LspSetup s;
+  s.hash = Text::lsp_ray_hash(ray);
+  return Text::lsp_passes(s, triangle);
+}
+
 // Of the triangles that the ray's line passes through, a bit each.
-template <class Best, class NumberOf>
+template <class Text, class NumberOf>
 HWY_INLINE void keep_nearest(const lsp_scene& scene, const LspTriangle* const (&records)[kLeafLanes],
                              uint32_t met, const RayRows& r, const P4& a, const P4& b, const P4& c, V4 v,
-                             V4 w, V4 det, NumberOf number_of, Best& best) {
+                             V4 w, V4 det, NumberOf number_of, typename Text::LspBest& best) {
   const P4 direction = {hn::Set(d4, r.direction[0]), hn::Set(d4, r.direction[1]),
                         hn::Set(d4, r.direction[2])};
   const V4 t = plane_depth(direction, hn::Set(d4, r.shear[2]), a, b, c);
@@ -126,6 +137,7 @@ HWY_INLINE void keep_nearest(const lsp_scene& scene, const LspTriangle* const (&
     const auto lane = static_cast<uint32_t>(std::countr_zero(met));
     const uint32_t primitive = records[lane]->primitive;
     if (!(ts[lane] < best.t || (ts[lane] == best.t && primitive < best.primitive))) continue;
+    if (is_passed<Text>(*records[lane], *r.given)) continue;
     best.t = ts[lane];
     best.u = vs[lane] / dets[lane];
     best.v = ws[lane] / dets[lane];
@@ -136,9 +148,10 @@ HWY_INLINE void keep_nearest(const lsp_scene& scene, const LspTriangle* const (&
 }
 
 // Of `count` records of the four; number_of a lane is that of its record.
-template <class Best, class NumberOf>
+template <class Text, class NumberOf>
 HWY_INLINE void hit_triangles(const lsp_scene& scene, const LspTriangle* const (&records)[kLeafLanes],
-                              uint32_t count, const RayRows& r, NumberOf number_of, Best& best) {
+                              uint32_t count, const RayRows& r, NumberOf number_of,
+                              typename Text::LspBest& best) {
   // Seen from the origin, the ray's axis last.
   const auto corner = [&](size_t c) HWY_ATTR {
     const auto row = [&](size_t i) HWY_ATTR {
@@ -170,7 +183,7 @@ HWY_INLINE void hit_triangles(const lsp_scene& scene, const LspTriangle* const (
   // Finite and not zero; no number is neither less.
   const M4 sound = hn::And(hn::Lt(hn::Abs(det), hn::Set(d4, HUGE_VALF)), hn::Gt(hn::Abs(det), zero));
   const uint32_t met = mask_bits(d4, hn::AndNot(hn::And(below, above), sound)) & ((1u << count) - 1);
-  if (met != 0) keep_nearest(scene, records, met, r, a, b, c, v, w, det, number_of, best);
+  if (met != 0) keep_nearest<Text>(scene, records, met, r, a, b, c, v, w, det, number_of, best);
 }
 
 }  // namespace

@@ -55,6 +55,14 @@ std::vector<Scene> scenes(bool cells) {
   Mesh apart = sphere(6);
   add_triangle(apart, {40, -20, -20}, {40, 20, -20}, {40, 0, 30});
   made.push_back({"far apart", of(apart, 24)});
+  // Leaves that are there in part, on a ball.
+  Mesh leaves = soup(300, 0.5f);
+  leaves.materials.resize(3);
+  leaves.materials[1].opacity = 0.3f;
+  leaves.materials[2].opacity = 0.8f;
+  for (uint32_t i = 0; i < leaves.triangles.size(); ++i) leaves.material_ids[i] = i % 3;
+  made.push_back({"in part", of(leaves, 5)});
+  EXPECT_NE(made.back().baked.header.required_features & LSP_FEATURE_COVERAGE, 0u);
   return made;
 }
 
