@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <span>
 
 #include "../surface_rays.h"
 #include "../vectors.h"
@@ -146,14 +147,16 @@ class Dial {
     return out;
   }
 
-  // The cheapest dial that keeps within errors, or the finest. The more of the origin tables is heeded, the
-  // less of the far tables can be: a walk along the border of what is within.
-  uint32_t cheapest(double wrong) {
+  // The cheapest dial that keeps within errors, or the finest, of those that heed no more of either table
+  // than `most`. The more of the origin tables is heeded, the less of the far tables can be: a walk along the
+  // border of what is within.
+  uint32_t cheapest(double wrong, uint32_t most) {
     // What nobody knows is never heeded: rays of other places than these may come there.
     constexpr uint32_t kClasses[] = {0, 1, 2, 3, 4, 5, 6, LSP_LOSS_UNKNOWN};
     uint32_t best = LSP_DIAL(0u, 0u);
     double least = INFINITY;
-    for (size_t near = 0, far = std::size(kClasses); near < std::size(kClasses) && far > 0;) {
+    const size_t nears = heeded(kClasses, most & 0xFFu);
+    for (size_t near = 0, far = heeded(kClasses, most >> 8u); near < nears && far > 0;) {
       const uint32_t dial = LSP_DIAL(kClasses[near], kClasses[far - 1]);
       header_.quality[LSP_QUALITY_BALANCED] = dial;
       double cost = 0;
@@ -177,6 +180,10 @@ class Dial {
   }
 
  private:
+  // How many of these classes, which ascend, are no more than `most`.
+  static size_t heeded(std::span<const uint32_t> classes, uint32_t most) {
+    return size_t(std::upper_bound(classes.begin(), classes.end(), most) - classes.begin());
+  }
   static double diagonal(const LspHeader& h) {
     return glm::length(glm::dvec3(h.bounds_max.x, h.bounds_max.y, h.bounds_max.z) -
                        glm::dvec3(h.bounds_min.x, h.bounds_min.y, h.bounds_min.z));
@@ -272,9 +279,10 @@ void choose_dial(Baked& baked, double wrong) {
   for (uint32_t& dial : h.quality) dial = LSP_DIAL_TABLES;
   if (baked.cell_tables.references.empty()) return;
   Dial dial(baked);
-  const uint32_t accurate = dial.cheapest(0.5 * wrong);
-  h.quality[LSP_QUALITY_BALANCED] = dial.cheapest(wrong);
-  h.quality[LSP_QUALITY_ACCURATE] = accurate;
+  const uint32_t balanced = dial.cheapest(wrong, LSP_DIAL_TABLES);
+  // Whatever this heeds balanced does, too, or it might err more in pictures that nobody measured.
+  h.quality[LSP_QUALITY_ACCURATE] = dial.cheapest(0.5 * wrong, balanced);
+  h.quality[LSP_QUALITY_BALANCED] = balanced;
   for (uint32_t quality = 0; quality < LSP_QUALITY_COUNT; ++quality)
     baked.qualities[quality] = dial.figures(quality);
 }
