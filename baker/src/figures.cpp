@@ -81,8 +81,7 @@ void print_error(const MeasuredError& error) {
   const double wrong = error.wrong_share();
   std::printf(
       "error       %.2f %% wrong hits, %.2f %% wrong misses (both +-%.2f %%, 95 %% of the time), depth off "
-      "by "
-      "%.2f %% of the diagonal\n",
+      "by %.2f %% of the diagonal\n",
       100.0 * double(error.wrong_hits) / double(error.rays),
       100.0 * double(error.wrong_misses) / double(error.rays),
       196 * std::sqrt(wrong * (1 - wrong) / double(error.rays)), 100 * error.depth_error);
@@ -94,8 +93,7 @@ void print_qualities(const Qualities& qualities) {
     const QualityFigures& q = qualities[quality];
     std::printf(
         "%-11s %.1f %% wrong, depth off by %.1f %%, ambient occlusion by %.1f %%, light by %.1f %%; about "
-        "%.1fx "
-        "exact rays on Vulkan, %.1fx on the CPU\n",
+        "%.1fx exact rays on Vulkan, %.1fx on the CPU\n",
         name, 100 * q.wrong, 100 * q.depth, 100 * q.occlusion, 100 * q.light, q.vulkan, q.cpu);
   }
 }

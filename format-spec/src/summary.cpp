@@ -308,9 +308,11 @@ Json summarize(std::span<const std::byte> file, const std::string& name, uint64_
   if (report.verdict() == Verdict::kUnsupported)
     throw Failure(Exit::kUnsupported, name,
                   "has a version or features that this program does not know: use a newer one");
-  if (report.fatal())
+  if (report.fatal()) {
+    const std::string& found = report.findings().begin()->second.examples.front().message;
     throw Failure(Exit::kInvalid, name,
-                  "is not an .lsp file: " + report.findings().begin()->second.examples.front().message);
+                  report.has(RuleId::kBadMagic) ? found : "is not an .lsp file: " + found);
+  }
   check_sections(view, report);
   check_hashes_and_codec(view, memory_limit, report);
 
