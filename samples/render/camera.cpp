@@ -47,7 +47,8 @@ Seen look(const std::vector<glm::vec3>& directions, const std::vector<LspHit>& h
   return seen;
 }
 
-Seen look_through(const Camera& camera, float aspect, RayTracer& tracer) {
+// Of a small picture.
+std::vector<glm::vec3> pixel_directions(const Camera& camera, float aspect) {
   constexpr int kHeight = 32;
   const int width = std::max(1, static_cast<int>(kHeight * std::min(aspect, 8.0f)));
   std::vector<glm::vec3> directions;
@@ -55,7 +56,32 @@ Seen look_through(const Camera& camera, float aspect, RayTracer& tracer) {
     for (int x = 0; x < width; ++x)
       directions.push_back(to_glm(camera.ray(glm::vec2(x, y) + 0.5f, width, kHeight).direction));
   }
+  return directions;
+}
+
+Seen look_through(const Camera& camera, float aspect, RayTracer& tracer) {
+  const std::vector<glm::vec3> directions = pixel_directions(camera, aspect);
   return look(directions, look_around(tracer, camera.eye, directions));
+}
+
+// Of what the camera sees the share whose front it sees and `other`, too.
+float also_seen(const Camera& camera, float aspect, RayTracer& tracer, glm::vec3 other) {
+  const std::vector<glm::vec3> directions = pixel_directions(camera, aspect);
+  const std::vector<LspHit> hits = look_around(tracer, camera.eye, directions);
+  std::vector<LspRay> rays;
+  for (size_t i = 0; i < hits.size(); ++i) {
+    if (!std::isfinite(hits[i].t) || glm::dot(to_glm(hits[i].normal), directions[i]) >= 0) continue;
+    const glm::vec3 way = camera.eye + hits[i].t * directions[i] - other;
+    // Up to just before the surface: from behind, its other side would be in the way.
+    if (glm::dot(to_glm(hits[i].normal), way) < 0)
+      rays.push_back({from_glm(other), 0.0f, from_glm(way), 0.999f});
+  }
+  const Seen seen = look(directions, hits);
+  std::vector<LspHit> between(rays.size());
+  tracer.trace({LSP_TRACE_OCCLUSION, 0.0f}, rays, between);
+  const auto free = std::ranges::count_if(between, [](const LspHit& hit) { return !std::isfinite(hit.t); });
+  const size_t all = seen.front + seen.back;
+  return all > 0 ? static_cast<float>(free) / static_cast<float>(all) : 0.0f;
 }
 
 // Looks along -`back` at all `points`, as near as shows them with a little room around.
@@ -94,11 +120,19 @@ Camera fit(const std::vector<glm::vec3>& points, glm::vec3 back, glm::vec3 up, f
   return camera;
 }
 
-Camera view_of_object(const RenderScene& scene, RayTracer& tracer, glm::vec3 up, float aspect) {
-  constexpr float kFovDegrees = 38.0f;
-  const glm::mat3 frame = axes(up);
-  std::vector<glm::vec3> points = scene.some_corners(1u << 16);
+constexpr float kObjectFovDegrees = 38.0f;
+
+std::vector<glm::vec3> some_corners(const RenderScene& scene) {
+  std::vector<glm::vec3> points;
+  for (const RenderScene::Corners& c : scene.some_triangles(1u << 16))
+    points.insert(points.end(), {c.v0, c.v0 + c.e1, c.v0 + c.e2});
   if (points.empty()) points = {scene.lo(), scene.hi()};
+  return points;
+}
+
+Camera view_of_object(const RenderScene& scene, RayTracer& tracer, glm::vec3 up, float aspect) {
+  const glm::mat3 frame = axes(up);
+  const std::vector<glm::vec3> points = some_corners(scene);
   // What lies flat is seen from higher up.
   const glm::vec3 size = glm::abs((scene.hi() - scene.lo()) * frame);
   const float rise = size.y < 0.3f * std::min(size.x, size.z) ? 0.75f : 0.36f;
@@ -107,7 +141,7 @@ Camera view_of_object(const RenderScene& scene, RayTracer& tracer, glm::vec3 up,
   for (int i = 0; i < 8; ++i) {
     const float azimuth = 0.54f + 0.25f * kPi * static_cast<float>(i);
     const glm::vec3 back = frame * glm::normalize(glm::vec3(std::sin(azimuth), rise, std::cos(azimuth)));
-    const Camera camera = fit(points, back, up, aspect, kFovDegrees);
+    const Camera camera = fit(points, back, up, aspect, kObjectFovDegrees);
     const Seen seen = look_through(camera, aspect, tracer);
     // Fronts of surfaces and many of them: into an open box, not at its back.
     float score = static_cast<float>(seen.front) + static_cast<float>(seen.primitives);
@@ -117,6 +151,17 @@ Camera view_of_object(const RenderScene& scene, RayTracer& tracer, glm::vec3 up,
     best = camera;
   }
   return best;
+}
+
+// How far it is from `origin`, inside, to the side of the scene's box.
+float to_side(const RenderScene& scene, glm::vec3 origin, glm::vec3 direction) {
+  const glm::vec3 sides =
+      (glm::mix(scene.lo(), scene.hi(), glm::greaterThan(direction, glm::vec3(0))) - origin) / direction;
+  float nearest = kInfinity;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (direction[axis] != 0) nearest = std::min(nearest, sides[axis]);
+  }
+  return nearest;
 }
 
 // The share of the scene's box that can be seen from `origin`, if it reaches everywhere as far as in 256
@@ -134,14 +179,22 @@ float visible_share(const RenderScene& scene, RayTracer& tracer, glm::vec3 origi
   const glm::vec3 size = scene.hi() - scene.lo();
   float volume = 0.0f;
   for (size_t i = 0; i < hits.size(); ++i) {
-    // No further than to the side of the box.
-    const glm::vec3 d = directions[i];
-    const glm::vec3 sides =
-        (glm::mix(scene.lo(), scene.hi(), glm::greaterThan(d, glm::vec3(0))) - origin) / d;
-    const float t = std::min({hits[i].t, sides.x, sides.y, sides.z});
+    const float t = std::min(hits[i].t, to_side(scene, origin, directions[i]));
     volume += t * t * t;
   }
   return volume * 4.0f * kPi / (3.0f * kDirections) / (size.x * size.y * size.z);
+}
+
+// Straight into a box that is open to a side, of which `inside` is the middle; nothing where there is none.
+std::optional<Camera> view_into_open_side(const RenderScene& scene, RayTracer& tracer, glm::vec3 inside,
+                                          glm::vec3 up, float aspect) {
+  const std::vector<glm::vec3> points = some_corners(scene);
+  for (const glm::vec3& side :
+       {glm::vec3(0, 0, 1), glm::vec3(1, 0, 0), glm::vec3(0, 0, -1), glm::vec3(-1, 0, 0)}) {
+    const Camera camera = fit(points, axes(up) * side, up, aspect, kObjectFovDegrees);
+    if (also_seen(camera, aspect, tracer, inside) > 0.3f) return camera;
+  }
+  return std::nullopt;
 }
 
 // Nothing where the scene is no hall.
@@ -167,14 +220,30 @@ std::optional<View> view_of_hall(const RenderScene& scene, RayTracer& tracer, co
   if (walls.front + walls.back < 52 || walls.front <= 2 * walls.back || wide < 32) return std::nullopt;
   if (visible_share(scene, tracer, inside) < 0.1f) return std::nullopt;
 
-  const auto free = [&](size_t i) { return std::min(hits[i % kAround].t, diagonal); };
+  const auto free = [&](size_t i) {
+    return std::min(hits[i % kAround].t, to_side(scene, inside, around[i % kAround]));
+  };
+  View view;
+  float reach = 0.0f;
+  for (size_t i = 0; i < kAround; ++i)
+    reach += std::min(free(i), 0.3f * diagonal) / static_cast<float>(kAround);
+  // Bright enough for surfaces as far away as the walls are on average.
+  view.lamp = {inside, 0.01f * diagonal, 3.0f * reach * reach};
+  if (const auto open = view_into_open_side(scene, tracer, inside, outside.up, aspect)) {
+    view.camera = *open;
+    // Above what stands in the box.
+    const float headroom =
+        std::min(look_around(tracer, inside, {outside.up})[0].t, to_side(scene, inside, outside.up));
+    view.lamp.position += 0.8f * headroom * outside.up;
+    return view;
+  }
+
   size_t ahead = 0;
   for (size_t i = 1; i < kAround; ++i) {
     if (free(i) + free(i + kAround / 2) > free(ahead) + free(ahead + kAround / 2)) ahead = i;
   }
   if (free(ahead) < free(ahead + kAround / 2)) ahead = (ahead + kAround / 2) % kAround;
   const size_t back = (ahead + kAround / 2) % kAround;
-  View view;
   view.camera.up = outside.up;
   view.camera.eye = inside + around[back] * 0.6f * free(back);
   view.camera.target = inside - around[back] * 0.1f * diagonal;
@@ -185,21 +254,10 @@ std::optional<View> view_of_hall(const RenderScene& scene, RayTracer& tracer, co
   const Seen from_inside = look_through(view.camera, aspect, tracer);
   if (from_outside.back > from_outside.front && 2 * from_inside.primitives < 5 * from_outside.primitives)
     return std::nullopt;
-  float reach = 0.0f;
-  for (const LspHit& hit : hits) reach += std::min(hit.t, 0.3f * diagonal) / static_cast<float>(kAround);
-  // Bright enough for surfaces as far away as the walls are on average.
-  view.lamp = {inside, 0.01f * diagonal, 3.0f * reach * reach};
   return view;
 }
 
 }  // namespace
-
-glm::vec3 named_up(const std::string& axis) { return axis == "z" ? glm::vec3(0, 0, 1) : glm::vec3(0, 1, 0); }
-
-glm::mat3 axes(glm::vec3 up) {
-  const glm::vec3 right(1, 0, 0);
-  return {right, up, glm::cross(right, up)};
-}
 
 LspRay Camera::ray(glm::vec2 pixel, int width, int height) const {
   const glm::vec3 forward = glm::normalize(target - eye);
@@ -250,17 +308,6 @@ glm::ivec2 parse_size(const std::string& text) {
   return size;
 }
 
-glm::vec3 likely_up(const RenderScene& scene) {
-  const glm::vec3 size = scene.hi() - scene.lo();
-  const glm::vec3 y_up(0, 1, 0);
-  // Without any height it may as well stand as a picture does, and who stands is thin from front to back,
-  // too, but does not face that way alone.
-  const float across = std::min(size.x, size.y);
-  if (!(size.z < 0.4f * across) || !(size.z > 0.005f * across)) return y_up;
-  const glm::vec3 facing = scene.facing_area();
-  return facing.z > 1.5f * (facing.x + facing.y) ? glm::vec3(0, 0, 1) : y_up;
-}
-
 View default_view(const RenderScene& scene, RayTracer& tracer, glm::vec3 up, float aspect) {
   const Camera outside = view_of_object(scene, tracer, up, aspect);
   if (const std::optional<View> hall = view_of_hall(scene, tracer, outside, aspect)) return *hall;
@@ -284,7 +331,8 @@ bool suit(Sky& sky, const Lamp& lamp, const RenderScene& scene) {
 Shot choose_shot(const RenderScene& scene, RayTracer& tracer, const std::string& camera,
                  const std::string& up, std::optional<glm::vec3> sun, float aspect) {
   const bool given = !camera.empty();
-  const glm::vec3 axis = !up.empty() || given ? named_up(up) : likely_up(scene);
+  const UpAxis likely = !up.empty() || given ? UpAxis{named_up(up), nullptr} : likely_up(scene);
+  const glm::vec3 axis = likely.direction;
   Shot shot;
   shot.sky.up = axis;
   shot.sky.sun_direction = sun ? *sun : axes(axis) * shot.sky.sun_direction;
@@ -293,8 +341,9 @@ Shot choose_shot(const RenderScene& scene, RayTracer& tracer, const std::string&
     shot.camera.up = axis;
     return shot;
   }
-  if (up.empty() && axis.z > 0)
-    shot.notes.emplace_back("lies flat in x and y: z is taken to be up; --up y where that is wrong");
+  if (likely.reason != nullptr) {
+    shot.notes.push_back(std::string(likely.reason) + ": z is taken to be up; --up y where that is wrong");
+  }
   const View view = default_view(scene, tracer, axis, aspect);
   shot.camera = view.camera;
   if (suit(shot.sky, view.lamp, scene))

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "ray_tracer.h"
+#include "up_axis.h"
 
 namespace lsp::sample {
 
@@ -28,16 +29,6 @@ Camera parse_camera(const std::string& text);
 std::string to_string(const Camera& camera);
 // Parses "WIDTHxHEIGHT", in pixels. Throws lsp::Failure (kUsage).
 glm::ivec2 parse_size(const std::string& text);
-
-// The axis that --up names: y or z.
-glm::vec3 named_up(const std::string& axis);
-
-// Right, up and towards the viewer, of a scene whose `up` is y or z.
-glm::mat3 axes(glm::vec3 up);
-
-// z where the scene lies flat in x and y and more of it faces up or down along z than along y, as terrain and
-// plans do; else y. Files do not say.
-glm::vec3 likely_up(const RenderScene& scene);
 
 // A light for a hall; radius 0: none.
 struct Lamp {

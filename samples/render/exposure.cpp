@@ -20,12 +20,16 @@ std::optional<float> parse_exposure(const std::string& text, bool camera_given) 
   return stops;
 }
 
-float chosen_exposure(double surface_luminance) {
+float chosen_exposure(double surface_luminance, double bright_luminance) {
   if (!(surface_luminance > 0)) return 0.0f;
   constexpr double kDark = 0.15;
   constexpr double kBright = 0.7;
+  constexpr double kHighlight = 1.0;  // still below white once it is tone-mapped
+  constexpr double kMost = 16.0;      // lamps in watts leave a room that dark
   const double wanted = std::clamp(surface_luminance, kDark, kBright);
-  return static_cast<float>(std::clamp(std::log2(wanted / surface_luminance), -8.0, 8.0));
+  double stops = std::log2(wanted / surface_luminance);
+  if (stops > 0) stops = std::clamp(std::log2(kHighlight / std::max(bright_luminance, 1e-9)), 0.0, stops);
+  return static_cast<float>(std::clamp(stops, -kMost, kMost));
 }
 
 }  // namespace lsp::sample

@@ -11,7 +11,8 @@ namespace lsp::sample {
 std::optional<float> parse_exposure(const std::string& text, bool camera_given);
 
 // Stops that bring surfaces which are too dark or too bright on average into the range that a display shows
-// well; a picture within it is left alone. `surface_luminance`: that of RenderReport.
-float chosen_exposure(double surface_luminance);
+// well; a picture within it is left alone, and where most is dark no more is given than the brightest tenth
+// can take. Both as RenderReport has them.
+float chosen_exposure(double surface_luminance, double bright_luminance);
 
 }  // namespace lsp::sample

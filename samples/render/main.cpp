@@ -218,7 +218,8 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
   });
   if (show_progress) std::fprintf(stderr, "\r               \r");
   const bool grey = options.effect == Effect::kAmbientOcclusion;
-  const float stops = exposure ? *exposure : chosen_exposure(report.surface_luminance);
+  const float stops =
+      exposure ? *exposure : chosen_exposure(report.surface_luminance, report.bright_luminance);
   for (const std::string& output : arguments.outputs) {
     Picture shown = picture;
     if (std::filesystem::path(output).extension() == ".png" && !grey) {

@@ -5,6 +5,7 @@
 
 #include "lsp/failures.hpp"
 #include "lsp/instanced_scene.hpp"
+#include "source_format.h"
 
 namespace lsp::sample {
 namespace {
@@ -38,6 +39,7 @@ void RenderScene::add_asset(const SceneFile& file, const std::string& path) {
                   "has no exact tree, which primary rays need; bake it without --no-exact");
   }
   headers_.push_back(&file.header());
+  source_endings_.merge(lsp::sample::source_endings(file.scene()));
   Asset& asset = assets_.emplace_back();
   asset.scene = &file.scene();
   index_primitives(asset, path);
@@ -147,18 +149,6 @@ std::vector<RenderScene::Corners> RenderScene::some_triangles(size_t most) const
     next -= scene.header->triangle_count;
   }
   return some;
-}
-
-std::vector<glm::vec3> RenderScene::some_corners(size_t most) const {
-  std::vector<glm::vec3> points;
-  for (const Corners& c : some_triangles(most)) points.insert(points.end(), {c.v0, c.v0 + c.e1, c.v0 + c.e2});
-  return points;
-}
-
-glm::vec3 RenderScene::facing_area() const {
-  glm::dvec3 sum(0.0);
-  for (const Corners& c : some_triangles(1u << 20)) sum += glm::abs(glm::dvec3(glm::cross(c.e1, c.e2)));
-  return 0.5 * sum;
 }
 
 void RenderScene::find_emitters() {

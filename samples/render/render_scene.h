@@ -6,6 +6,7 @@
 #include <glm/glm.hpp>
 #include <memory>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -72,10 +73,16 @@ class RenderScene {
   glm::vec3 lo() const;
   glm::vec3 hi() const;
   float diagonal() const { return glm::length(hi() - lo()); }
-  // Corners of about `most` triangles, spread over all instances; of all where there are fewer.
-  std::vector<glm::vec3> some_corners(size_t most) const;
-  // Area of triangles by what faces x, y and z, either way; of many triangles, of a part of them.
-  glm::vec3 facing_area() const;
+  // A triangle in scene space.
+  struct Corners {
+    glm::vec3 v0;
+    glm::vec3 e1;  // from v0 to the others
+    glm::vec3 e2;
+  };
+  // About `most` triangles, spread over all instances; all where there are fewer.
+  std::vector<Corners> some_triangles(size_t most) const;
+  // Of the files that the meshes were read from, as source_endings of source_format.h.
+  const std::set<std::string>& source_endings() const { return source_endings_; }
   // What the file does not have and what stands in for it; empty if nothing is missing.
   const std::vector<std::string>& notes() const { return notes_; }
 
@@ -107,12 +114,6 @@ class RenderScene {
     std::vector<uint32_t> triangle_of_primitive;
     std::vector<LspMaterial> materials;
   };
-  // A triangle in scene space.
-  struct Corners {
-    glm::vec3 v0;
-    glm::vec3 e1;
-    glm::vec3 e2;
-  };
   struct Emitter {
     uint32_t instance;  // 0 where there are none
     uint32_t triangle;
@@ -126,13 +127,13 @@ class RenderScene {
   uint32_t instance_count() const;
   const Asset& asset_of(uint32_t instance) const;
   Corners corners(uint32_t instance, const LspTriangle& triangle) const;
-  std::vector<Corners> some_triangles(size_t most) const;
 
   std::string path_;
   std::optional<SceneFile> file_;
   std::unique_ptr<InstancedScene> instanced_;
   std::vector<Asset> assets_;
   std::vector<const LspHeader*> headers_;
+  std::set<std::string> source_endings_;
   std::vector<Emitter> emitters_;
   std::vector<std::string> notes_;
 };

@@ -125,19 +125,7 @@ class Renderer {
       }
     }
     finish();
-    double total_luminance = 0;
-    double surface_log = 0;
-    size_t surface_pixels = 0;
-    for (size_t i = 0; i < picture_.pixels.size(); ++i) {
-      const auto bright = static_cast<double>(luminance(picture_.pixels[i]));
-      total_luminance += bright;
-      if (met_[i] == 0) continue;
-      surface_log += std::log(std::max(bright, 1e-4));
-      ++surface_pixels;
-    }
-    if (surface_pixels > 0)
-      report_.surface_luminance = std::exp(surface_log / static_cast<double>(surface_pixels));
-    report_.mean_luminance = total_luminance / static_cast<double>(picture_.pixels.size());
+    measure_luminance();
     report_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     return std::move(picture_);
   }
@@ -154,6 +142,25 @@ class Renderer {
         squares_[c][pixel] += bright * bright;
       }
     });
+  }
+
+  void measure_luminance() {
+    double total = 0;
+    double surface_log = 0;
+    std::vector<float> surfaces;
+    for (size_t i = 0; i < picture_.pixels.size(); ++i) {
+      const float bright = luminance(picture_.pixels[i]);
+      total += static_cast<double>(bright);
+      if (met_[i] == 0) continue;
+      surface_log += std::log(std::max(static_cast<double>(bright), 1e-7));
+      surfaces.push_back(bright);
+    }
+    report_.mean_luminance = total / static_cast<double>(picture_.pixels.size());
+    if (surfaces.empty()) return;
+    report_.surface_luminance = std::exp(surface_log / static_cast<double>(surfaces.size()));
+    const auto bright = surfaces.begin() + static_cast<std::ptrdiff_t>(surfaces.size() * 9 / 10);
+    std::ranges::nth_element(surfaces, bright);
+    report_.bright_luminance = static_cast<double>(*bright);
   }
 
   static float luminance(glm::vec3 color) { return glm::dot(color, glm::vec3(0.2126f, 0.7152f, 0.0722f)); }

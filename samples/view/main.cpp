@@ -184,7 +184,7 @@ float automatic_exposure(const RenderScene& scene, const Sky& sky, const ViewSta
   options.samples = 4;
   RenderReport report;
   render(scene, sky, state.camera, options, *make_cpu_tracer(scene, 0), report, {});
-  return chosen_exposure(report.surface_luminance);
+  return chosen_exposure(report.surface_luminance, report.bright_luminance);
 }
 
 // The file, or a mesh once it is baked.

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "camera.h"
+#include "exposure.h"
 
 namespace lsp::sample {
 namespace {
@@ -24,9 +25,9 @@ class Mesh {
  public:
   // Corners of a quad, counter-clockwise from its front.
   void add_quad(const std::array<glm::vec3, 4>& corners) {
-    for (const glm::vec3& p : corners)
-      text_ += "v " + std::to_string(p.x) + " " + std::to_string(p.y) + " " + std::to_string(p.z) + "\n";
+    for (const glm::vec3& p : corners) text_ += "v " + words(p) + "\n";
     text_ += "f -4 -3 -2 -1\n";
+    corners_.insert(corners_.end(), corners.begin(), corners.end());
   }
   // Without the face towards -z if `open`; `inward`: its faces look inside.
   void add_box(glm::vec3 lo, glm::vec3 hi, bool inward, bool open = false) {
@@ -59,10 +60,62 @@ class Mesh {
       for (int j = 0; j < 20; ++j) add_quad({at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)});
     }
   }
-  const std::string& text() const { return text_; }
+  // A wall of `lo` to `hi` across x, with a window from a quarter to half of either side.
+  void add_window_wall(float x, glm::vec2 lo, glm::vec2 hi, bool towards_x) {
+    const auto add = [&](glm::vec2 a, glm::vec2 b) {
+      std::array<glm::vec3, 4> corners = {glm::vec3(x, a.x, a.y), glm::vec3(x, b.x, a.y),
+                                          glm::vec3(x, b.x, b.y), glm::vec3(x, a.x, b.y)};
+      if (!towards_x) std::swap(corners[1], corners[3]);
+      add_quad(corners);
+    };
+    const glm::vec2 a = glm::mix(lo, hi, 0.25f), b = glm::mix(lo, hi, 0.52f);
+    add(lo, {a.x, hi.y});
+    add({b.x, lo.y}, hi);
+    add({a.x, lo.y}, {b.x, a.y});
+    add({a.x, b.y}, {b.x, hi.y});
+  }
+  // Tapers from a square of 2 at -2 to one of 1 at 2 along z, or along y.
+  void add_bust(bool z_up) {
+    const auto at = [&](int corner, bool top) {
+      const float half = top ? 0.5f : 1.0f;
+      const glm::vec2 p(corner == 0 || corner == 3 ? -half : half, corner < 2 ? -half : half);
+      const float height = top ? 2.0f : -2.0f;
+      return z_up ? glm::vec3(p, height) : glm::vec3(p.x, height, -p.y);
+    };
+    for (int i = 0; i < 4; ++i) {
+      const int next = (i + 1) % 4;
+      add_quad({at(i, false), at(next, false), at(next, true), at(i, true)});
+    }
+    add_quad({at(3, false), at(2, false), at(1, false), at(0, false)});
+    const glm::vec3 tip = z_up ? glm::vec3(0, 0, 3) : glm::vec3(0, 3, 0);
+    for (int i = 0; i < 4; ++i) add_quad({at(i, true), at((i + 1) % 4, true), tip, tip});
+  }
+  const std::string& text() const { return text_; }  // as .obj
+  std::string stl() const {
+    std::string stl = "solid s\n";
+    const std::vector<glm::vec3> corners = soup();
+    for (size_t i = 0; i < corners.size(); i += 3) {
+      stl += "facet normal 0 0 0\nouter loop\n";
+      for (size_t k = 0; k < 3; ++k) stl += "vertex " + words(corners[i + k]) + "\n";
+      stl += "endloop\nendfacet\n";
+    }
+    return stl + "endsolid s\n";
+  }
+  // Corners of triangles, three each.
+  std::vector<glm::vec3> soup() const {
+    std::vector<glm::vec3> soup;
+    for (size_t i = 0; i + 3 < corners_.size(); i += 4) {
+      for (const size_t k : {0, 1, 2, 0, 2, 3}) soup.push_back(corners_[i + k]);
+    }
+    return soup;
+  }
 
  private:
+  static std::string words(glm::vec3 p) {
+    return std::to_string(p.x) + " " + std::to_string(p.y) + " " + std::to_string(p.z);
+  }
   std::string text_;
+  std::vector<glm::vec3> corners_;  // of quads
 };
 
 class DefaultView : public ::testing::Test {
@@ -73,9 +126,24 @@ class DefaultView : public ::testing::Test {
   }
   ~DefaultView() override { std::filesystem::remove_all(folder_); }
 
-  void bake(const Mesh& mesh) {
-    std::ofstream(folder_ / "mesh.obj") << mesh.text();
-    ASSERT_EQ(run("lsp-bake " + file("mesh.obj") + " -o " + file("mesh.lsp") + " --base wide --quiet"), 0);
+  void bake(const Mesh& mesh, const std::string& name = "mesh.obj") {
+    if (name == "mesh.obj") std::ofstream(folder_ / name) << mesh.text();
+    if (name == "mesh.stl") std::ofstream(folder_ / name) << mesh.stl();
+    if (name == "mesh.gltf") write_gltf(mesh.soup());
+    ASSERT_EQ(run("lsp-bake " + file(name) + " -o " + file("mesh.lsp") + " --base wide --quiet"), 0);
+  }
+  void write_gltf(const std::vector<glm::vec3>& soup) {
+    const size_t bytes = soup.size() * sizeof soup[0];
+    std::ofstream(folder_ / "mesh.bin", std::ios::binary)
+        .write(reinterpret_cast<const char*>(soup.data()), static_cast<std::streamsize>(bytes));
+    std::ofstream(folder_ / "mesh.gltf") << nlohmann::json{
+        {"asset", {{"version", "2.0"}}},
+        {"buffers", {{{"uri", "mesh.bin"}, {"byteLength", bytes}}}},
+        {"bufferViews", {{{"buffer", 0}, {"byteLength", bytes}}}},
+        {"accessors",
+         {{{"bufferView", 0}, {"componentType", 5126}, {"count", soup.size()}, {"type", "VEC3"}}}},
+        {"meshes", {{{"primitives", {{{"attributes", {{"POSITION", 0}}}}}}}}},
+        {"nodes", {{{"mesh", 0}}}}};
   }
   nlohmann::json render(const std::string& options = "") {
     EXPECT_EQ(
@@ -140,6 +208,40 @@ TEST_F(DefaultView, AnOpenBoxIsLookedInto) {
   EXPECT_LT(eye(render()).z, -1.0f);
 }
 
+// As Cornell's: what stands in it is no wall of a hall.
+TEST_F(DefaultView, AnOpenBoxWithThingsInItIsLookedInto) {
+  Mesh mesh;
+  mesh.add_box(glm::vec3(-1), glm::vec3(1), true, true);
+  mesh.add_box(glm::vec3(-0.3f, -1, -0.6f), glm::vec3(0.4f, -0.3f, -0.2f), false);
+  mesh.add_box(glm::vec3(-0.6f, -1, 0.3f), glm::vec3(0, 0.2f, 0.8f), false);
+  bake(mesh);
+  const Camera camera = parse_camera(render().at("camera"));
+  EXPECT_LT(camera.eye.z, -1.5f);
+  EXPECT_LT(glm::length(glm::vec2(camera.eye)), 0.5f) << "straight";
+  EXPECT_NE(errors().find("a lamp hangs in its middle"), std::string::npos) << errors();
+}
+
+TEST_F(DefaultView, WindowsDoNotLetTheCameraOut) {
+  Mesh room;
+  for (const bool inward : {true, false}) {
+    const float thick = inward ? 0.0f : 0.2f;
+    const glm::vec3 hi = glm::vec3(4, 3, 4) + thick;
+    for (const float side : {-1.0f, 1.0f})
+      room.add_window_wall(side * hi.x, {-hi.y, -hi.z}, {hi.y, hi.z}, (side > 0) != inward);
+    room.add_quad({glm::vec3(-hi.x, -hi.y, -hi.z), glm::vec3(-hi.x, -hi.y, hi.z),
+                   glm::vec3(hi.x, -hi.y, hi.z), glm::vec3(hi.x, -hi.y, -hi.z)});
+    room.add_quad({glm::vec3(-hi.x, hi.y, -hi.z), glm::vec3(hi.x, hi.y, -hi.z), glm::vec3(hi.x, hi.y, hi.z),
+                   glm::vec3(-hi.x, hi.y, hi.z)});
+    room.add_quad({glm::vec3(-hi.x, -hi.y, hi.z), glm::vec3(-hi.x, hi.y, hi.z), glm::vec3(hi.x, hi.y, hi.z),
+                   glm::vec3(hi.x, -hi.y, hi.z)});
+    room.add_quad({glm::vec3(-hi.x, -hi.y, -hi.z), glm::vec3(hi.x, -hi.y, -hi.z),
+                   glm::vec3(hi.x, hi.y, -hi.z), glm::vec3(-hi.x, hi.y, -hi.z)});
+  }
+  bake(room);
+  const glm::vec3 p = glm::abs(eye(render()));
+  EXPECT_LT(std::max({p.x, p.y, p.z}), 4.0f) << errors();
+}
+
 TEST_F(DefaultView, ARoomIsSeenFromInsideABodyFromOutside) {
   const auto is_inside = [&] {
     const glm::vec3 p = glm::abs(eye(render()));
@@ -193,6 +295,46 @@ TEST_F(DefaultView, FindsAndTakesTheAxisThatIsUp) {
   cube.add_box(glm::vec3(-1), glm::vec3(1), false);
   bake(cube);
   EXPECT_EQ(render().at("up"), "y");
+}
+
+// What the file was says more than its shape: glTF has y up by its standard, .stl comes from programs with z.
+TEST_F(DefaultView, TheAxisIsThatOfTheSource) {
+  Mesh plan;
+  plan.add_terrain(0.5f, true);
+  bake(plan, "mesh.gltf");
+  EXPECT_EQ(render().at("up"), "y");
+  Mesh cube;
+  cube.add_box(glm::vec3(-1), glm::vec3(1), false);
+  bake(cube, "mesh.stl");
+  EXPECT_EQ(render().at("up"), "z");
+  EXPECT_NE(errors().find("comes from .stl: z is taken to be up"), std::string::npos) << errors();
+  EXPECT_EQ(render("--up y").at("up"), "y");
+  Mesh terrain;
+  terrain.add_terrain(0.5f, false);
+  bake(terrain, "mesh.stl");
+  EXPECT_EQ(render().at("up"), "y") << "it lies flat in x and z";
+}
+
+TEST_F(DefaultView, WhatStandsIsSeenStanding) {
+  for (const bool z_up : {true, false}) {
+    Mesh bust;
+    bust.add_bust(z_up);
+    bake(bust);
+    EXPECT_EQ(render().at("up"), z_up ? "z" : "y");
+    EXPECT_EQ(errors().find("stands on what is flat along z") != std::string::npos, z_up) << errors();
+    bake(bust, "mesh.stl");
+    EXPECT_EQ(render().at("up"), z_up ? "z" : "y");
+  }
+}
+
+TEST(Exposure, BrightestTenthStaysBelowWhite) {
+  EXPECT_EQ(chosen_exposure(0.3, 5.0), 0.0f) << "within the range nothing is changed";
+  EXPECT_FLOAT_EQ(chosen_exposure(0.0375, 0.1), 2.0f);
+  EXPECT_FLOAT_EQ(chosen_exposure(0.0375, 0.5), 1.0f) << "a stop less";
+  EXPECT_EQ(chosen_exposure(0.0375, 4.0), 0.0f) << "but not darker than it is";
+  EXPECT_FLOAT_EQ(chosen_exposure(1.4, 9.0), -1.0f);
+  EXPECT_GT(chosen_exposure(1e-5, 1e-4), 13.0f);
+  EXPECT_EQ(chosen_exposure(0.0, 0.0), 0.0f);
 }
 
 // The picture of a z-up scene is that of the same one y-up, turned.
