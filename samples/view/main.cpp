@@ -10,6 +10,7 @@
 #include "bake_first.h"
 #include "controls.h"
 #include "exposure.h"
+#include "exposure_meter.h"
 #include "lsp/command_line.h"
 #include "lsp/instanced_scene.hpp"
 #include "lsp/trace_arguments.hpp"
@@ -114,20 +115,25 @@ std::string figures(const ViewReport& report, const ViewState& state, const Rend
   return line + text;
 }
 
-// Keeps the window up until it is closed or has shown so many frames.
-void show(Viewer& viewer, GLFWwindow* window, ViewState& state, const Arguments& arguments,
-          const RenderScene& scene) {
+// Keeps the window up until it is closed or has shown so many frames. `meter`: null where the exposure is
+// what it is.
+void show(Viewer& viewer, GLFWwindow* window, ViewState& state, ExposureMeter* meter,
+          const Arguments& arguments, const RenderScene& scene) {
   Controls controls(window, state.camera, scene.diagonal());
   double titled = -1.0;
+  double metered = glfwGetTime();
   uint32_t shown = 0;
   while (glfwWindowShouldClose(window) == GLFW_FALSE && (arguments.frames == 0 || shown < arguments.frames)) {
     glfwPollEvents();
     const bool moving = controls.apply(state);
+    const double time = glfwGetTime();
+    if (meter != nullptr) meter->follow(state, static_cast<float>(time - metered));
+    metered = time;
     const ViewState now = state;
     const bool done = viewer.frame(now, moving, [&] {
       glfwPollEvents();
       controls.apply(state);
-      return !(state == now) || glfwWindowShouldClose(window) != GLFW_FALSE;
+      return !state.same_samples(now) || glfwWindowShouldClose(window) != GLFW_FALSE;
     });
     if (done) ++shown;
     if (!done && glfwGetWindowAttrib(window, GLFW_ICONIFIED) != GLFW_FALSE) glfwWaitEventsTimeout(0.2);
@@ -174,16 +180,19 @@ void say(const CommonOptions& common, const std::string& file, const std::vector
   for (const std::string& note : notes) std::cerr << kProgram << ": " << file << ": " << note << "\n";
 }
 
-// The exposure that lsp-render chooses of a small picture, traced on the CPU.
-float automatic_exposure(const RenderScene& scene, const Sky& sky, const ViewState& state, glm::ivec2 size) {
+// The exposure that lsp-render chooses of a small picture, of `longest` pixels along its longer side, traced
+// on the CPU by so many threads.
+float automatic_exposure(const RenderScene& scene, const Sky& sky, const ViewState& state, glm::ivec2 size,
+                         float longest, int threads) {
   RenderOptions options;
   options.effect = state.effect == VIEW_DIFFUSE ? Effect::kDiffuse : Effect::kAll;
-  const float scale = std::min(1.0f, 160.0f / static_cast<float>(std::max(size.x, size.y)));
+  const float scale = std::min(1.0f, longest / static_cast<float>(std::max(size.x, size.y)));
   options.width = std::max(1, static_cast<int>(scale * static_cast<float>(size.x)));
   options.height = std::max(1, static_cast<int>(scale * static_cast<float>(size.y)));
   options.samples = 4;
+  options.threads = threads;
   RenderReport report;
-  render(scene, sky, state.camera, options, *make_cpu_tracer(scene, 0), report, {});
+  render(scene, sky, state.camera, options, *make_cpu_tracer(scene, threads), report, {});
   return chosen_exposure(report.surface_luminance, report.bright_luminance);
 }
 
@@ -225,14 +234,20 @@ void run(Arguments& arguments, const CommonOptions& common) {
       choose_shot(scene, *make_cpu_tracer(scene, 0), arguments.camera, arguments.up, std::nullopt, aspect);
   say(common, arguments.file, shot.notes);
   state.camera = shot.camera;
-  state.exposure = exposure ? *exposure : automatic_exposure(scene, shot.sky, state, size);
+  std::optional<ExposureMeter> meter;
+  state.exposure = exposure ? *exposure : automatic_exposure(scene, shot.sky, state, size, 160, 0);
+  if (!exposure) {
+    // While one flies, few pixels in one thread will do: the rest is the picture's.
+    meter.emplace(
+        state, [&](const ViewState& seen) { return automatic_exposure(scene, shot.sky, seen, size, 64, 1); });
+  }
 
   const Window window(size);
   Gpu gpu(window.handle(), arguments.validation);
   ViewReport shown;
   {
     Viewer viewer(gpu, window.handle(), scene, shot.sky);
-    show(viewer, window.handle(), state, arguments, scene);
+    show(viewer, window.handle(), state, meter ? &*meter : nullptr, arguments, scene);
     shown = viewer.report();
     if (!arguments.screenshot.empty()) {
       const Viewer::Screenshot taken = viewer.screenshot();
@@ -266,10 +281,11 @@ int main(int argc, char** argv) {
          "FILE", a.file,
          "The baked scene: an .lsp file, or .json with instances of several; or a mesh, which is baked first")
       ->required();
-  app.add_option(
-         "--effect", a.effect,
-         "What is shown: light (all of it, with one diffuse bounce), diffuse (the bounce alone), ao, or heat "
-         "(steps of the bounce's rays: black, red, yellow, from 128 on white) (default light)")
+  app.add_option("--effect", a.effect,
+                 "What is shown: light (all of it, with one diffuse bounce; metals are matt, of their "
+                 "colour), diffuse "
+                 "(the bounce alone), ao, or heat "
+                 "(steps of the bounce's rays: black, red, yellow, from 128 on white) (default light)")
       ->check(CLI::IsMember(kEffects));
   app.add_option(
          "--split", a.split,
@@ -289,8 +305,8 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1e-6f, 1e6f));
   app.add_option(
       "--exposure", a.exposure,
-      "Stops to brighten light by, or auto: what is too dark or too bright at first is brought into "
-      "range, as by lsp-render (default auto, with --camera 0)");
+      "Stops to brighten light by, or auto: what is too dark or too bright is brought into range, as by "
+      "lsp-render, and follows the camera (default auto, with --camera 0)");
   app.add_option("--frames", a.frames, "Show so many and end (default: until the window is closed)")
       ->check(CLI::Range(1u, 1u << 20));
   app.add_option("--screenshot", a.screenshot, "Write what the window shows after --frames, as .png");

@@ -20,7 +20,8 @@ constexpr uint32_t kLargestScale = 8;
 constexpr float kHeatWhite = 128.0f;
 
 auto fields(const lsp_trace_options& o) { return std::tie(o.flags, o.lod, o.quality, o.max_loss); }
-auto fields(const ViewState& s) { return std::tie(s.camera, s.effect, s.split, s.ao_distance, s.exposure); }
+// Not the exposure: samples are what they are.
+auto fields(const ViewState& s) { return std::tie(s.camera, s.effect, s.split, s.ao_distance); }
 
 void set_camera(ViewFrame& frame, const Camera& camera) {
   const glm::vec3 forward = glm::normalize(camera.target - camera.eye);
@@ -50,7 +51,7 @@ uint32_t divided(uint32_t size, uint32_t scale) { return (size + scale - 1) / sc
 
 }  // namespace
 
-bool ViewState::operator==(const ViewState& other) const {
+bool ViewState::same_samples(const ViewState& other) const {
   return fields(*this) == fields(other) && fields(approximate) == fields(other.approximate);
 }
 
@@ -114,7 +115,6 @@ void Viewer::restart(const ViewState& state, uint32_t scale) {
   frame_.window_height = extent_.height;
   frame_.split = static_cast<uint32_t>(
       std::lround(std::clamp(state.split, 0.0f, 1.0f) * static_cast<float>(extent_.width)));
-  frame_.exposure = std::exp2(state.exposure);
   frame_.heat_white = kHeatWhite;
   frame_.blue_first = swapchain_.blue_first() ? 1 : 0;
 }
@@ -152,12 +152,13 @@ bool Viewer::frame(const ViewState& state, bool moving, const std::function<bool
   if (!fits && !fit_window()) return false;
   const uint32_t scale = scale_for(moving);
   // A camera that has come to rest ends the large pixels of its movement.
-  if (report_.samples == 0 || !(state == state_) || (!moving && scale != report_.scale))
+  if (report_.samples == 0 || !state.same_samples(state_) || (!moving && scale != report_.scale))
     restart(state, scale);
   if (!trace_sample(interrupted)) {
     report_.samples = 0;  // rows have samples that others lack
     return false;
   }
+  frame_.exposure = std::exp2(state.exposure);
   tracer_.show(frame_);
   if (swapchain_.show(tracer_.shown(), VK_NULL_HANDLE)) return true;
   extent_ = {};  // the window's images are out of date

@@ -17,7 +17,8 @@ struct ViewState {
   float ao_distance = 0.1f;         // in diagonals of the scene
   float exposure = 0.0f;            // stops
 
-  bool operator==(const ViewState& other) const;
+  // Whether samples of the one can be added to those of the other: they may be shown differently.
+  bool same_samples(const ViewState& other) const;
 };
 
 // Of all samples of a state; times, rays and steps but of slices for which shaders had to be compiled.

@@ -6,14 +6,18 @@
 
 #define GLFW_INCLUDE_NONE
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <cstdlib>
 #include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <thread>
 
 #include "bake_first.h"
 #include "controls.h"
+#include "exposure_meter.h"
 #include "lsp/vulkan_device.hpp"
 #include "viewer.h"
 
@@ -357,6 +361,12 @@ TEST_F(View, LivesThroughMovesAndResizing) {
     EXPECT_EQ(viewer.report().samples, 3u);
     const Shot before = viewer.screenshot();
 
+    state.exposure = 1.0f;
+    show(false);
+    EXPECT_EQ(viewer.report().samples, 4u) << "how samples are shown changes none of them";
+    EXPECT_GT(mean(viewer.screenshot()), mean(before) + 10);
+    state.exposure = 0.0f;
+
     state.split = 0.25f;
     show(true);
     EXPECT_EQ(viewer.report().samples, 1u) << "a moved line begins anew";
@@ -432,6 +442,43 @@ TEST_F(View, ExitCodes) {
   setenv("DISPLAY", ":no", 1);
   EXPECT_EQ(run("lsp-view " + scene + " --frames 1" + none), 5) << "there is no display";
   setenv("DISPLAY", display.c_str(), 1);
+}
+
+// From one exposure to the next in small steps, and no further; keys add to it.
+TEST(ViewExposure, FollowsTheCameraSmoothly) {
+  ViewState state;
+  state.exposure = 2.0f;
+  std::atomic<int> measured = 0;
+  ExposureMeter meter(state, [&](const ViewState& seen) {
+    ++measured;
+    return seen.camera.eye.x + (seen.effect == VIEW_DIFFUSE ? 3.0f : 0.0f);
+  });
+  for (int i = 0; i < 10; ++i) meter.follow(state, 0.1f);
+  EXPECT_EQ(state.exposure, 2.0f) << "nothing has moved";
+  EXPECT_EQ(measured, 0);
+  const auto settle = [&](float wanted) {
+    const float first = state.exposure;
+    float largest = 0;
+    for (int i = 0; i < 2000 && state.exposure != wanted; ++i) {
+      const float before = state.exposure;
+      meter.follow(state, 0.02f);
+      largest = std::max(largest, std::abs(state.exposure - before));
+      if (state.exposure == before) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    EXPECT_EQ(state.exposure, wanted);
+    EXPECT_LT(largest, 0.06f * std::abs(wanted - first)) << "a jump";
+  };
+  state.camera.eye.x = -1.0f;
+  settle(-1.0f);
+  EXPECT_EQ(measured, 1);
+  state.exposure += 0.25f;  // a key
+  meter.follow(state, 0.1f);
+  EXPECT_EQ(state.exposure, -0.75f);
+  state.camera.eye.x = 4.0f;
+  settle(4.25f);
+  state.effect = VIEW_DIFFUSE;
+  settle(7.25f);
+  EXPECT_EQ(measured, 3);
 }
 
 TEST(ViewControls, MaxLossMovesInSteps) {
