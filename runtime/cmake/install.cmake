@@ -8,7 +8,7 @@ endif()
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/lsp)
 
 set(libraries lsp lsp_layout)
-set(headers interface.h export.h error.hpp lsp.h lsp_instances.h scene_file.hpp instances.hpp)
+set(headers interface.h export.h lsp.h lsp_instances.h lsp.hpp error.hpp view.hpp scene_file.hpp instances.hpp)
 if(LSP_VULKAN)
   list(APPEND libraries lsp_vulkan)
   list(APPEND headers lsp_vulkan.h parts.h)

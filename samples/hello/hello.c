@@ -1,48 +1,27 @@
-/* The smallest use of liblsp: map a file, open it, trace one ray.
- *
- *   hello FILE.lsp
- *
- * The ray falls from above onto the centre of the scene. */
+/* The smallest use of liblsp: opens FILE.lsp and traces one ray, from above onto the scene's centre. */
 #include <math.h>
 #include <stdio.h>
 
 #include "lsp/lsp.h"
 
-static int fail(const char* file, const lsp_error* error) {
-  fprintf(stderr, "hello: %s: %s\n", file, error->message);
-  return (int)error->status;
-}
-
 int main(int argc, char** argv) {
-  if (argc != 2) {
-    fprintf(stderr, "usage: hello FILE.lsp\n");
-    return 1;
-  }
+  if (argc != 2) return fprintf(stderr, "usage: hello FILE.lsp\n"), 1;
   lsp_error error;
   lsp_mapping mapping;
-  if (lsp_map_file(argv[1], &mapping, &error) != LSP_OK) return fail(argv[1], &error);
-
   lsp_scene scene;
-  if (lsp_open(mapping.bytes, mapping.size, &scene, &error) != LSP_OK) return fail(argv[1], &error);
-
-  const lsp_float3 lo = scene.header->bounds_min;
-  const lsp_float3 hi = scene.header->bounds_max;
-  const LspRay ray = {.origin = {0.5f * (lo.x + hi.x), hi.y + 0.1f * (hi.y - lo.y), 0.5f * (lo.z + hi.z)},
-                      .tmin = 0.0f,
-                      .direction = {0.0f, -1.0f, 0.0f},
-                      .tmax = INFINITY};
-  /* Approximate where the file has cells or Line Spaces, exact otherwise. */
-  const lsp_trace_options options = {.flags = LSP_TRACE_APPROXIMATE};
   LspHit hit;
-  if (lsp_trace(&scene, &options, &ray, &hit, 1, NULL, &error) != LSP_OK) return fail(argv[1], &error);
-
-  if (hit.primitive == LSP_NONE) {
-    printf("no hit\n");
-  } else {
-    printf("hit triangle %u at distance %g, normal (%g, %g, %g)%s\n", hit.primitive, (double)hit.t,
-           (double)hit.normal.x, (double)hit.normal.y, (double)hit.normal.z,
-           hit.flags & LSP_HIT_LINE_SPACE ? ", answered by a table" : "");
+  lsp_status status = lsp_map_file(argv[1], &mapping, &error);
+  if (status == LSP_OK) status = lsp_open(mapping.bytes, mapping.size, &scene, &error);
+  if (status == LSP_OK) {
+    const lsp_float3 lo = scene.header->bounds_min, hi = scene.header->bounds_max;
+    const LspRay ray = {{(lo.x + hi.x) / 2, 2 * hi.y - lo.y, (lo.z + hi.z) / 2}, 0, {0, -1, 0}, INFINITY};
+    const lsp_trace_options options = {.flags = LSP_TRACE_APPROXIMATE}; /* exact where there are no tables */
+    status = lsp_trace(&scene, &options, &ray, &hit, 1, NULL, &error);
   }
+  if (status != LSP_OK) return fprintf(stderr, "hello: %s: %s\n", argv[1], error.message), (int)status;
+  if (hit.primitive == LSP_NONE) return puts("no hit"), 0;
+  printf("hit triangle %u at distance %g%s\n", hit.primitive, (double)hit.t,
+         hit.flags & LSP_HIT_LINE_SPACE ? ", answered by a table" : "");
   lsp_unmap_file(&mapping);
   return 0;
 }

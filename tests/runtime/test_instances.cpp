@@ -158,6 +158,7 @@ TEST(Instances, AgreeWithEveryMovedTriangle) {
   EXPECT_EQ(memcmp(hits.data(), again.data(), hits.size() * sizeof(LspHit)), 0);
 
   // Any hit: where and only where there is a closest one.
+  EXPECT_THROW(instances.trace({}, 255, rays, View<LspHit>(again.data(), again.size() - 1)), Error);
   instances.trace({LSP_TRACE_ANY_HIT, 0}, 255, rays, again);
   for (size_t i = 0; i < rays.size(); ++i) {
     ASSERT_EQ(std::isinf(hits[i].t), std::isinf(again[i].t)) << i;

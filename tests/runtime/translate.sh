@@ -34,3 +34,26 @@ translate wide "$source/runtime/vulkan/trace.comp" -DLSP_WIDE
 spirv-cross instances.spv --msl --msl-version 20300 --output instances.metal
 grep -q '^kernel void main0(' instances.metal
 echo "instances: Metal $(wc -l <instances.metal) lines"
+
+# Several scenes in one pipeline, by their numbers.
+cat >several.comp <<'SHADER'
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_buffer_reference : require
+#extension GL_EXT_buffer_reference_uvec2 : require
+#define LSP_INSTANCES
+#include "lsp/lsp.glsl"
+layout(local_size_x = 64) in;
+layout(std430, set = 1, binding = 0) buffer Work { vec4 work[]; };
+void main() {
+  uint i = gl_GlobalInvocationID.x;
+  LspScene scene = lsp_asset(floatBitsToUint(work[2u * i + 1u].w));
+  LspRay ray = LspRay(work[2u * i].xyz, 0.0, work[2u * i + 1u].xyz, LSP_INFINITY);
+  LspHit hit = lsp_trace(scene, ray, LSP_TRACE_APPROXIMATE);
+  work[2u * i].w = lsp_occluded(scene, ray, LSP_TRACE_APPROXIMATE) ? hit.t + lsp_hit_offset(scene, hit) : 0.0;
+}
+SHADER
+"$glslc" -O --target-env=vulkan1.2 "${includes[@]}" -o several.spv several.comp
+# What it reads of instances is not there.
+spirv-cross several.spv --reflect | grep -q '"LspInstanceBuffer"' && { echo "several scenes read instances"; exit 1; }
+echo "several scenes in one shader"

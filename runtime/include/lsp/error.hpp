@@ -23,4 +23,9 @@ class Error : public std::runtime_error {
   std::string file_;
 };
 
+// Throws Error unless `status` is LSP_OK. `error` is what the function that answered it has filled.
+inline void throw_unless_ok(lsp_status status, const lsp_error& error, const std::string& file = "") {
+  if (status != LSP_OK) throw Error(status, file, error.message);
+}
+
 }  // namespace lsp

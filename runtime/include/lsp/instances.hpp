@@ -1,33 +1,16 @@
 // Instances that own their memory: the thin C++ side of lsp_instances.h. Header-only.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
-#include <iterator>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "lsp/error.hpp"
 #include "lsp/lsp_instances.h"
+#include "lsp/view.hpp"
 
 namespace lsp {
-
-// Elements side by side, of a vector, an array, a span or a pointer: not owned. C++17 has no std::span.
-template <class T>
-class View {
- public:
-  View(T* data, size_t size) : data_(data), size_(size) {}  // `size` elements from `data` on
-  // All of a range that has data and size.
-  template <class Range>
-  View(Range&& range) : data_(std::data(range)), size_(std::size(range)) {}
-  T* data() const { return data_; }      // the first
-  size_t size() const { return size_; }  // how many
-
- private:
-  T* data_;
-  size_t size_;
-};
 
 // Built from scenes and places, and again as places change; memory is kept from one time to the next. Errors
 // are thrown as lsp::Error. Tracing is const and may be done from any number of threads, but not while
@@ -56,19 +39,20 @@ class Instances {
     const auto count = static_cast<uint32_t>(instances.size());
     memory_.resize(lsp_instances_bytes(count) / sizeof(Block) + 1);
     lsp_error error;
-    const lsp_status status =
+    throw_unless_ok(
         lsp_instances_build(assets_.data(), static_cast<uint32_t>(assets_.size()), instances.data(), count,
-                            memory_.data(), memory_.size() * sizeof(Block), &view_, &error);
-    if (status != LSP_OK) throw Error(status, "", error.message);
+                            memory_.data(), memory_.size() * sizeof(Block), &view_, &error),
+        error);
   }
 
-  // `rays` and `hits` are of one size. Adds to *counts unless it is null.
+  // `rays` and `hits` are of one size, else LSP_ERROR_LIMIT. Adds to *counts unless it is null.
   void trace(const lsp_trace_options& options, uint32_t mask, View<const LspRay> rays, View<LspHit> hits,
              lsp_trace_counts* counts = nullptr) const {
+    require_one_size(rays, hits);
     lsp_error error;
-    const lsp_status status =
-        lsp_trace_instances(&view_, &options, mask, rays.data(), hits.data(), rays.size(), counts, &error);
-    if (status != LSP_OK) throw Error(status, "", error.message);
+    throw_unless_ok(
+        lsp_trace_instances(&view_, &options, mask, rays.data(), hits.data(), rays.size(), counts, &error),
+        error);
   }
 
   const lsp_instances& view() const { return view_; }  // good until the next build

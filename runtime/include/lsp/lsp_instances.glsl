@@ -10,6 +10,10 @@
  *   LspHit hit = lsp_trace_instances(count, ray, 0xFFu, LSP_TRACE_APPROXIMATE);
  *   bool shadowed = lsp_occluded_instances(count, ray, 0xFFu, LSP_TRACE_APPROXIMATE);
  *
+ * and, for several scenes in one pipeline that no instance places, an asset by its number:
+ *
+ *   LspHit hit = lsp_trace(lsp_asset(number), ray, LSP_TRACE_APPROXIMATE);
+ *
  * `count` is that of the instances, 0 allowed. Bindings, both read-only storage buffers:
  *   +0 the assets, an lsp_vulkan_asset each, in the order in which instances number them
  *   +1 the memory that lsp_instances_build has filled, as it is
@@ -91,10 +95,8 @@ LspPlace lsp_load_place(uint i) {
   return LspPlace(a.xyz, vec3(a.w, b.xy), vec3(b.zw, c.x), c.yzw, d.xyz);
 }
 
-LspScene lsp_asset_of(uint instance) {
-  uint asset = lsp_instance_words[10u * instance].x;
-  return LspScene(lsp_assets[asset].sections, asset);
-}
+LspScene lsp_asset(uint number) { return LspScene(lsp_assets[number].sections, number); }
+LspScene lsp_asset_of(uint instance) { return lsp_asset(lsp_instance_words[10u * instance].x); }
 
 /* Traces a ray in an asset's own space. What both texts do alike is done once: that halves what a device compiles. */
 LspTraced lsp_trace_asset(LspScene scene, LspRay ray, uint flags) {
@@ -114,6 +116,12 @@ LspTraced lsp_trace_asset(LspScene scene, LspRay ray, uint flags) {
   traced.counts = walked.counts;
   traced.valid = true;
   return traced;
+}
+
+/* A ray in one asset's own space, without instances: the hit is that of lsp_trace with the asset's dial. */
+LspHit lsp_trace(LspScene scene, LspRay ray, uint flags) { return lsp_trace_asset(scene, ray, flags).hit; }
+bool lsp_occluded(LspScene scene, LspRay ray, uint flags) {
+  return lsp_trace(scene, ray, flags | LSP_TRACE_OCCLUSION).t < LSP_INFINITY;
 }
 
 LspCounts lsp_add_counts(LspCounts a, LspCounts b) {

@@ -19,9 +19,7 @@ class SceneFile {
   // A packed file whose raw form is larger than `memory_limit` bytes is refused (LSP_ERROR_LIMIT).
   explicit SceneFile(const std::string& path, uint64_t memory_limit = UINT64_MAX) {
     lsp_error error;
-    const auto check = [&](lsp_status status) {
-      if (status != LSP_OK) throw Error(status, path, error.message);
-    };
+    const auto check = [&](lsp_status status) { throw_unless_ok(status, error, path); };
     check(lsp_map_file(path.c_str(), &mapping_.value, &error));
     const lsp_mapping& file = mapping_.value;
     const lsp_status status = lsp_open(file.bytes, file.size, &scene_, &error);

@@ -22,7 +22,23 @@ cp "$source"/runtime/include/lsp/* "$source"/format-spec/include/lsp/* include/l
 blocks INTEGRATION glsl >ao.comp
 blocks INTEGRATION "glsl instances" >instances.comp
 run INTEGRATION sh
-if command -v spirv-cross >/dev/null; then run INTEGRATION "sh spirv-cross"; else echo "without spirv-cross"; fi
+if command -v spirv-cross >/dev/null; then
+  run INTEGRATION "sh spirv-cross"
+  # What the table of bindings says.
+  for line in 't0, space0' 't2, space0' 't0, space1' 'RWByteAddressBuffer.*u1, space1' \
+    '^cbuffer Push$' 'ifndef SPIRV_CROSS_CONSTANT_ID_1$' 'numthreads(64, 1, 1)'; do
+    grep -q "$line" ao_cells.hlsl || { echo "ao_cells.hlsl has no $line"; exit 1; }
+  done
+  grep '^kernel void main0(' ao_cells.metal | tr ',' '\n' >kernel
+  for line in 'Push&.*buffer(0)' 'LspHeaderBuffer&.*buffer(1)' 'LspTriangleBuffer&.*buffer(3)' 'Rays&.*buffer(13)' \
+    'Open&.*buffer(14)'; do
+    grep -q "$line" kernel || { echo "the kernel of ao_cells.metal has no $line"; cat kernel; exit 1; }
+  done
+  [ -z "$(grep -o 'buffer([0-9]*)' kernel | sort | uniq -d)" ] || { echo "buffers of Metal share numbers"; cat kernel; exit 1; }
+  grep -q 'function_constant(1)' ao_cells.metal
+else
+  echo "without spirv-cross"
+fi
 "$program" room.lsp | tee said
 grep -q '^256 rays went on, [1-9]' said && grep -q '^hits: [1-9]' said || { echo "INTEGRATION.md: its program meets nothing"; exit 1; }
 
