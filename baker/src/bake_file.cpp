@@ -56,9 +56,11 @@ FileBake bake_file(Mesh& mesh, Arguments& a, const std::array<uint64_t, 2>& sour
 void refuse_notes(const std::vector<std::string>& notes, const Arguments& a) {
   if (notes.empty()) return;
   for (const std::string& note : notes) std::fprintf(stderr, "lsp-bake: note: %s\n", note.c_str());
-  throw Failure(Exit::kInvalid, a.inputs.front().string(),
-                "led to " + std::to_string(notes.size()) +
-                    " notes, which --strict refuses: mend the input or leave out --strict");
+  std::string inputs;
+  for (const auto& input : a.inputs) inputs += (inputs.empty() ? "" : ", ") + input.string();
+  throw Failure(Exit::kInvalid, inputs,
+                "led to " + std::to_string(notes.size()) + (notes.size() == 1 ? " note" : " notes") +
+                    ", which --strict refuses: mend the input or leave out --strict");
 }
 
 }  // namespace lsp

@@ -84,6 +84,9 @@ function(lsp_install_programs)
       if(LSP_HELP2MAN AND NOT CMAKE_CROSSCOMPILING)
         lsp_install_manual(${program} ${does_${program}})
       endif()
+      # bash-completion looks for a file of the command's name.
+      install(FILES ${PROJECT_SOURCE_DIR}/runtime/cmake/completion.bash RENAME ${program}
+        DESTINATION ${CMAKE_INSTALL_DATAROOTDIR}/bash-completion/completions COMPONENT programs)
     endif()
   endforeach()
   if(programs)

@@ -250,7 +250,11 @@ TEST_F(LspBake, NotesAreInTheReportAndStrictRefusesThem) {
   EXPECT_NE(report["notes"][0].get<std::string>().find("1 lines, points"), std::string::npos);
   EXPECT_EQ(run("lines.obj -o c.lsp --depth 3 --strict"), 3);
   EXPECT_NE(read("err").find("1 lines, points"), std::string::npos);
+  EXPECT_NE(read("err").find("lsp-bake: lines.obj: led to 1 note, which"), std::string::npos) << read("err");
   EXPECT_FALSE(fs::exists(folder_ / "c.lsp"));
+  EXPECT_EQ(run("grid.obj lines.obj -o c.lsp --depth 3 --strict"), 3);
+  EXPECT_NE(read("err").find("lsp-bake: grid.obj, lines.obj: led to 1 note, which"), std::string::npos)
+      << read("err");
 }
 
 TEST_F(LspBake, AnAnimationsTimeIsInMeta) {

@@ -76,7 +76,20 @@ if has lsp-tools; then
     "$program" --help >help.txt
     grep -nE '.{81}|TEXT|:\{|More options' help.txt && fail "$program --help is not fit to read"
     [ "$manuals" = 0 ] || [ -s "$root/usr/share/man/man1/lsp-$name.1" ] || fail "$program has no manual page"
+    [ -s "$root/usr/share/bash-completion/completions/lsp-$name" ] || fail "$program has no completion"
   done
+  . "$root/usr/share/bash-completion/completions/lsp-render"
+  completes() { # completes ANSWER WORD...: the last is the one at the cursor
+    local answer=$1
+    shift
+    COMP_WORDS=("$@") COMP_CWORD=$(($# - 1))
+    _lsp_complete
+    [ "${COMPREPLY[*]}" = "$answer" ] || fail "bash completes ${*:2} to '${COMPREPLY[*]}'"
+  }
+  completes "--effect" "$root/usr/bin/lsp-render" x.lsp --eff
+  completes "diffuse direct" "$root/usr/bin/lsp-render" x.lsp --effect d
+  completes "--output" "$root/usr/bin/lsp-bake" --out
+  completes "" "$root/usr/bin/lsp-bake" --output x  # files are bash's own
   "$root/usr/bin/lsp-info" --version
   "$root/usr/bin/lsp-info" --quiet "$source/format-spec/corpus/2.0/valid/full.lsp"
 fi

@@ -53,7 +53,7 @@ void main() {
   work[2u * i].w = lsp_occluded(scene, ray, LSP_TRACE_APPROXIMATE) ? hit.t + lsp_hit_offset(scene, hit) : 0.0;
 }
 SHADER
-"$glslc" -O --target-env=vulkan1.2 "${includes[@]}" -o several.spv several.comp
-# What it reads of instances is not there.
+"$glslc" -O -g --target-env=vulkan1.2 "${includes[@]}" -o several.spv several.comp
+# The buffer of instances is not read.
 spirv-cross several.spv --reflect | grep -q '"LspInstanceBuffer"' && { echo "several scenes read instances"; exit 1; }
 echo "several scenes in one shader"
