@@ -3,6 +3,7 @@
 
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "check.h"
 #include "file.h"
@@ -15,7 +16,7 @@ using namespace lsp;
 using namespace lsp::format;
 
 struct Arguments {
-  std::string file;
+  std::vector<std::string> files;
   std::string level = "structure";
   std::vector<std::filesystem::path> meshes;
   uint64_t memory_limit = uint64_t{8} << 30;
@@ -40,13 +41,16 @@ const char* advice(Verdict verdict) {
   return "";
 }
 
-int validate(const Arguments& arguments, const CommonOptions& common) {
-  if (arguments.rules) {
-    std::fputs(rules_markdown().c_str(), stdout);
-    return 0;
-  }
-  if (arguments.file.empty()) throw Failure(Exit::kUsage, "", "FILE.lsp is missing, see --help");
-  const MappedFile file(arguments.file);
+// What is to be said of a file.
+struct Outcome {
+  int exit = 0;
+  std::string text;  // findings, a line each
+  std::string last;  // of standard error; empty where the file is valid
+  nlohmann::ordered_json json;
+};
+
+Outcome check(const std::string& path, const Arguments& arguments) {
+  const MappedFile file(path);
   CheckOptions options;
   options.level = arguments.level == "container"  ? Level::kContainer
                   : arguments.level == "geometry" ? Level::kGeometry
@@ -57,36 +61,94 @@ int validate(const Arguments& arguments, const CommonOptions& common) {
   const Report report = check_file(file.bytes(), options);
   const Verdict verdict = report.verdict();
 
-  if (common.json) {
-    nlohmann::ordered_json json;
-    json["program"] = "lsp-validate";
-    json["version"] = kProgramVersion;
-    json["file"] = arguments.file;
-    json["bytes"] = file.bytes().size();
-    json["level"] = arguments.level;
-    json.update(to_json(report));
-    std::puts(json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace).c_str());
-  } else if (!common.quiet) {
-    std::fputs(to_text(report).c_str(), stdout);
+  Outcome outcome;
+  outcome.exit = exit_code(verdict);
+  outcome.text = to_text(report);
+  const uint64_t errors = report.count(Severity::kFatal) + report.count(Severity::kError);
+  if (verdict != Verdict::kValid) {
+    outcome.last =
+        std::string(advice(verdict)) + " (" + std::to_string(errors) + (errors == 1 ? " error)" : " errors)");
   }
-  if (verdict != Verdict::kValid)
-    std::fprintf(
-        stderr, "lsp-validate: %s: %s (%llu errors)\n", arguments.file.c_str(), advice(verdict),
-        static_cast<unsigned long long>(report.count(Severity::kFatal) + report.count(Severity::kError)));
-  return exit_code(verdict);
+  outcome.json["program"] = "lsp-validate";
+  outcome.json["version"] = kProgramVersion;
+  outcome.json["file"] = path;
+  outcome.json["bytes"] = file.bytes().size();
+  outcome.json["level"] = arguments.level;
+  outcome.json.update(to_json(report));
+  return outcome;
+}
+
+// One of several, which the others do not have to suffer for.
+Outcome check_or_say_why(const std::string& path, const Arguments& arguments) {
+  try {
+    return check(path, arguments);
+  } catch (const Failure& failure) {
+    const int exit = static_cast<int>(failure.exit());
+    return {exit, "", failure.what(), {{"file", path}, {"exit", exit}, {"message", failure.what()}}};
+  }
+}
+
+void print(const nlohmann::ordered_json& json) {
+  std::puts(json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace).c_str());
+}
+
+void print_last(const std::string& path, const Outcome& outcome) {
+  if (!outcome.last.empty())
+    std::fprintf(stderr, "lsp-validate: %s: %s\n", path.c_str(), outcome.last.c_str());
+}
+
+int validate_one(const std::string& path, const Arguments& arguments, const CommonOptions& common) {
+  const Outcome outcome = check(path, arguments);
+  if (common.json)
+    print(outcome.json);
+  else if (!common.quiet)
+    std::fputs(outcome.text.c_str(), stdout);
+  print_last(path, outcome);
+  return outcome.exit;
+}
+
+// The exit code is that of the first file that is not valid; every file is checked.
+int validate_all(const Arguments& arguments, const CommonOptions& common) {
+  if (!arguments.meshes.empty())
+    throw Failure(Exit::kUsage, "", "--mesh is of one file; check the others by themselves");
+  int exit = 0;
+  nlohmann::ordered_json files = nlohmann::ordered_json::array();
+  for (const std::string& path : arguments.files) {
+    const Outcome outcome = check_or_say_why(path, arguments);
+    if (exit == 0) exit = outcome.exit;
+    std::istringstream lines(common.json || common.quiet ? "" : outcome.text);
+    for (std::string line; std::getline(lines, line);) std::printf("%s: %s\n", path.c_str(), line.c_str());
+    print_last(path, outcome);
+    files.push_back(outcome.json);
+  }
+  if (common.json)
+    print({{"program", "lsp-validate"}, {"version", kProgramVersion}, {"exit", exit}, {"files", files}});
+  return exit;
+}
+
+int validate(const Arguments& arguments, const CommonOptions& common) {
+  if (arguments.rules) {
+    std::fputs(rules_markdown().c_str(), stdout);
+    return 0;
+  }
+  if (arguments.files.empty()) throw Failure(Exit::kUsage, "", "FILE.lsp is missing, see --help");
+  return arguments.files.size() == 1 ? validate_one(arguments.files[0], arguments, common)
+                                     : validate_all(arguments, common);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Checks an .lsp file and reports everything that is wrong with it.\n"
+      "Checks .lsp files and reports everything that is wrong with them.\n"
       "Silent on success. Exit codes: 0 valid, 1 usage, 2 cannot be read, 3 invalid, 4 internal error,\n"
-      "5 needs a newer program, 6 over the memory limit, 7 not baked from the files of --mesh.",
+      "5 needs a newer program, 6 over the memory limit, 7 not baked from the files of --mesh; of several\n"
+      "files the code of the first that is not valid.",
       "lsp-validate");
   Arguments arguments;
   CommonOptions common;
-  app.add_option("FILE.lsp", arguments.file, "The file to check");
+  app.add_option("FILE.lsp", arguments.files,
+                 "The files to check; of several, each line begins with its file's name");
   app.add_option("--level", arguments.level,
                  "How deep: container (header, sections, hashes), structure (and all that a tracer's indices "
                  "follow), "

@@ -386,6 +386,7 @@ std::string make_summary(const Figures& f) {
                  tables.c_str(), megabytes(number(f.bake, "file_bytes")).c_str(),
                  total_seconds(f.bake.at("seconds")));
   for (const auto& item : f.bake.at("skipped")) text += "skipped:     " + item.get<std::string>() + "\n";
+  for (const auto& item : f.bake.at("notes")) text += "note:        " + item.get<std::string>() + "\n";
   text += format("validate:    %.2f s\n", f.validate_seconds);
   text += "device:      " + f.exact.at("device").get<std::string>() + " (" +
           f.exact.at("backend").get<std::string>() +

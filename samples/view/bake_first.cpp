@@ -8,7 +8,8 @@
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
-#include <vector>
+#include <fstream>
+#include <nlohmann/json.hpp>
 
 #include "lsp/program.h"
 
@@ -22,14 +23,14 @@ std::string find_baker() {
   return !error && ::access(beside.c_str(), X_OK) == 0 ? beside.string() : "lsp-bake";
 }
 
-// Runs a program with its standard output shut, and answers its exit code.
-int run_quietly(const std::vector<std::string>& words) {
+// Runs a program with its standard output in the file `out`, and answers its exit code.
+int run_into(const std::filesystem::path& out, const std::vector<std::string>& words) {
   std::vector<char*> arguments;
   for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, out.c_str(), O_WRONLY | O_CREAT, 0600);
   pid_t child = 0;
   const int failed = posix_spawnp(&child, arguments[0], &actions, nullptr, arguments.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
@@ -53,11 +54,14 @@ BakedFile::BakedFile(const std::string& mesh, bool quiet) {
   folder_ = pattern;
   path_ = folder_ / "scene.lsp";
   try {
-    std::vector<std::string> words{find_baker(), mesh, "-o", path_.string()};
+    std::vector<std::string> words{find_baker(), mesh, "-o", path_.string(), "--json"};
     if (quiet) words.emplace_back("--quiet");
-    const int exit = run_quietly(words);
+    const std::filesystem::path report = folder_ / "report.json";
+    const int exit = run_into(report, words);
     if (exit != 0)
       throw Failure(static_cast<Exit>(exit), mesh, "cannot be shown, as lsp-bake could not bake it");
+    std::ifstream text(report);
+    notes_ = nlohmann::json::parse(text).at("notes").get<std::vector<std::string>>();
   } catch (...) {
     std::error_code ignored;
     std::filesystem::remove_all(folder_, ignored);

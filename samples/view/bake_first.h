@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 namespace lsp::sample {
 
@@ -16,10 +17,13 @@ class BakedFile {
   BakedFile& operator=(const BakedFile&) = delete;
 
   const std::filesystem::path& path() const { return path_; }
+  // What lsp-bake has left out or taken otherwise than the mesh has it.
+  const std::vector<std::string>& notes() const { return notes_; }
 
  private:
   std::filesystem::path folder_;
   std::filesystem::path path_;
+  std::vector<std::string> notes_;
 };
 
 }  // namespace lsp::sample

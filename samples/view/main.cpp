@@ -202,6 +202,9 @@ std::unique_ptr<RenderScene> open_scene(const std::string& file, const CommonOpt
   if (path.extension() == ".lsp" || is_instanced_scene(file)) return std::make_unique<RenderScene>(path);
   say(common, file, {"is baked first; to keep that: lsp-bake " + file + " -o scene.lsp"});
   const BakedFile baked(file, common.quiet);
+  if (!common.quiet) {
+    for (const std::string& note : baked.notes()) std::cerr << kProgram << ": note: " << note << "\n";
+  }
   return std::make_unique<RenderScene>(baked.path());  // a mapping needs no name
 }
 

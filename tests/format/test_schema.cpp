@@ -102,6 +102,34 @@ TEST(Program, SilentOnSuccessAndQuietOnDemand) {
   EXPECT_EQ(run(std::string(LSP_VALIDATE) + " --quiet " + invalid).exit, 3);
 }
 
+// Each is checked, whatever the others are; findings name their file.
+TEST(Program, SeveralFilesInOneRun) {
+  const std::string validate = LSP_VALIDATE, valid = (kCorpus / "valid/full.lsp").string();
+  const std::string invalid = (kCorpus / "invalid/LSP-0503-two-parents.lsp").string();
+  const std::string newer = (kCorpus / "invalid/LSP-0104-other-major.lsp").string();
+  EXPECT_EQ(run(validate + " " + valid + " " + valid).exit, 0);
+  EXPECT_EQ(run(validate + " " + valid + " " + valid).out, "");
+  const Output bad = run(validate + " " + valid + " " + newer + " /no/such/file.lsp " + invalid);
+  EXPECT_EQ(bad.exit, 5) << "the first that is not valid";
+  EXPECT_NE(bad.out.find(newer + ": fatal LSP-0104"), std::string::npos) << bad.out;
+  EXPECT_NE(bad.out.find(invalid + ": error LSP-0503"), std::string::npos) << bad.out;
+  EXPECT_EQ(bad.out.find(valid + ":"), std::string::npos) << bad.out;
+  EXPECT_EQ(run(validate + " /no/such/file.lsp " + valid).exit, 2);
+  const Output reported = run(validate + " --json " + valid + " /no/such/file.lsp " + invalid);
+  const Json json = Json::parse(reported.out, nullptr, false);
+  ASSERT_FALSE(json.is_discarded()) << reported.out;
+  EXPECT_EQ(json["exit"], 2);
+  EXPECT_EQ(reported.exit, 2);
+  ASSERT_EQ(json["files"].size(), 3u);
+  std::ifstream file(std::filesystem::path(LSP_FORMAT_DIR) / "report.schema.json");
+  const Json schema = Json::parse(file);
+  EXPECT_EQ(misfit(schema, json["files"][0], ""), "");
+  EXPECT_EQ(json["files"][1]["exit"], 2);
+  EXPECT_NE(json["files"][1]["message"].get<std::string>().find("cannot be opened"), std::string::npos);
+  EXPECT_EQ(misfit(schema, json["files"][2], ""), "");
+  EXPECT_EQ(run(validate + " " + valid + " " + valid + " --mesh /dev/null").exit, 1);
+}
+
 TEST(Program, ExitCodes) {
   const std::string valid = (kCorpus / "valid/full.lsp").string();
   const std::string validate = LSP_VALIDATE, info = LSP_INFO;

@@ -73,6 +73,7 @@ TEST(Page, SaysTheFigures) {
   const std::string summary = make_summary(example());
   EXPECT_NE(summary.find("1.50 times"), std::string::npos);
   EXPECT_NE(summary.find("skipped:     empty shafts"), std::string::npos);
+  EXPECT_NE(summary.find("note:        a <note>"), std::string::npos);
 }
 
 TEST(Page, TellsOfCellsAndTheirDial) {
