@@ -218,6 +218,11 @@ std::optional<View> view_of_hall(const RenderScene& scene, RayTracer& tracer, co
   // A hall has walls nearly all around that face inwards, most of them some way off. The skin of a solid body
   // faces away from whoever is inside; a hole in one is a small part of it.
   if (walls.front + walls.back < 52 || walls.front <= 2 * walls.back || wide < 32) return std::nullopt;
+  // And something to stand on, which the hole of a ring has not.
+  std::vector<glm::vec3> below;
+  for (size_t i = 0; i < kAround; i += 4) below.push_back(glm::normalize(around[i] - 1.5f * outside.up));
+  const Seen floor = look(below, look_around(tracer, inside, below));
+  if (floor.front + floor.back < below.size() * 3 / 4) return std::nullopt;
   if (visible_share(scene, tracer, inside) < 0.1f) return std::nullopt;
 
   const auto free = [&](size_t i) {

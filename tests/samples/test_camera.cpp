@@ -90,6 +90,19 @@ class Mesh {
     const glm::vec3 tip = z_up ? glm::vec3(0, 0, 3) : glm::vec3(0, 3, 0);
     for (int i = 0; i < 4; ++i) add_quad({at(i, true), at((i + 1) % 4, true), tip, tip});
   }
+  // A pipe along y, of radii 1.8 and 2.
+  void add_pipe() {
+    const auto at = [](int i, float radius, float y) {
+      const float angle = 0.3926991f * static_cast<float>(i);
+      return glm::vec3(radius * std::cos(angle), y, radius * std::sin(angle));
+    };
+    for (int i = 0; i < 16; ++i) {
+      add_quad({at(i, 2, -1), at(i, 2, 1), at(i + 1, 2, 1), at(i + 1, 2, -1)});
+      add_quad({at(i + 1, 1.8f, -1), at(i + 1, 1.8f, 1), at(i, 1.8f, 1), at(i, 1.8f, -1)});
+      add_quad({at(i, 2, 1), at(i, 1.8f, 1), at(i + 1, 1.8f, 1), at(i + 1, 2, 1)});
+      add_quad({at(i + 1, 2, -1), at(i + 1, 1.8f, -1), at(i, 1.8f, -1), at(i, 2, -1)});
+    }
+  }
   const std::string& text() const { return text_; }  // as .obj
   std::string stl() const {
     std::string stl = "solid s\n";
@@ -219,6 +232,16 @@ TEST_F(DefaultView, AnOpenBoxWithThingsInItIsLookedInto) {
   EXPECT_LT(camera.eye.z, -1.5f);
   EXPECT_LT(glm::length(glm::vec2(camera.eye)), 0.5f) << "straight";
   EXPECT_NE(errors().find("a lamp hangs in its middle"), std::string::npos) << errors();
+}
+
+TEST_F(DefaultView, ARingHasNoFloorAndIsNoHall) {
+  Mesh ring;
+  ring.add_pipe();
+  bake(ring);
+  EXPECT_GT(glm::length(eye(render())), 3.0f) << errors();
+  ring.add_quad({glm::vec3(-2, -1, 2), glm::vec3(2, -1, 2), glm::vec3(2, -1, -2), glm::vec3(-2, -1, -2)});
+  bake(ring);
+  EXPECT_LT(glm::length(eye(render())), 2.0f) << "with a floor it is one";
 }
 
 TEST_F(DefaultView, WindowsDoNotLetTheCameraOut) {
