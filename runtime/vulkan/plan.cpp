@@ -64,6 +64,13 @@ bool is_read(const Wanted& wanted, uint32_t uses, const LspHeader& header) {
 }
 
 lsp_status check_uses(const LspHeader& header, uint32_t uses, lsp_error* error) {
+  constexpr uint32_t kKnown = LSP_USE_EXACT | LSP_USE_APPROXIMATE | LSP_USE_MATERIALS | LSP_USE_TABLES |
+                              LSP_USE_OCCLUSION | LSP_USE_ADDRESSES_IF_NEEDED | LSP_USE_ADDRESSES_ALWAYS;
+  if (const uint32_t unknown = uses & ~kKnown; unknown != 0) {
+    return lsp::fail(error, LSP_ERROR_UNSUPPORTED, 0,
+                     "library version %s does not know uses 0x%x: leave them out or link a newer one",
+                     LSP_LIBRARY_VERSION_STRING, unknown);
+  }
   const uint32_t features = header.required_features;
   if ((uses & LSP_USE_EXACT) != 0 && (features & LSP_FEATURE_EXACT) == 0) {
     return lsp::fail(error, LSP_ERROR_UNSUPPORTED, 0, "has no exact tree; trace it approximately");

@@ -170,6 +170,11 @@ TEST(Loading, EveryUseHasItsSectionsOfCells) {
   EXPECT_EQ(sections_for(scene, LSP_USE_EXACT), tree + surfaces);
   EXPECT_EQ(sections_for(scene, LSP_USE_EXACT | LSP_USE_OCCLUSION), tree + Names{"TRIA"});
   EXPECT_EQ(sections_for(scene, kAll), tables + surfaces + exact_cells + tree);
+  lsp_vulkan_plan plan;
+  lsp_error error;
+  EXPECT_EQ(lsp_vulkan_plan_buffers(&scene, LSP_USE_EXACT | 0x40u, &kLimits, &plan, &error),
+            LSP_ERROR_UNSUPPORTED);
+  EXPECT_NE(std::string(error.message).find("does not know uses 0x40"), std::string::npos) << error.message;
   EXPECT_EQ(sections_for(scene, LSP_USE_TABLES | LSP_USE_MATERIALS), tables + surfaces + Names{"MATL"});
   EXPECT_LT(plan_of(scene, kAmbientOcclusion).bytes, plan_of(scene, LSP_USE_TABLES).bytes);
   EXPECT_LT(plan_of(scene, LSP_USE_TABLES).bytes, plan_of(scene, LSP_USE_APPROXIMATE).bytes);

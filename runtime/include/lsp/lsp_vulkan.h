@@ -88,8 +88,8 @@ typedef struct lsp_vulkan_plan {
 #define LSP_VULKAN_BUFFER_USAGE (VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT)
 
 /* Plans the buffers of an open scene for `uses` (LSP_USE_*). LSP_ERROR_UNSUPPORTED when the file lacks what
- * is asked for; LSP_ERROR_LIMIT when a section is larger than a buffer of the device may be, or than a
- * storage buffer's range and addresses were not allowed. */
+ * is asked for, or the library does not know it; LSP_ERROR_LIMIT when a section is larger than a buffer of
+ * the device may be, or than a storage buffer's range and addresses were not allowed. */
 LSP_API lsp_status lsp_vulkan_plan_buffers(const lsp_scene* scene, uint32_t uses,
                                            const lsp_vulkan_limits* limits, lsp_vulkan_plan* plan,
                                            lsp_error* error);
