@@ -301,6 +301,8 @@ std::string to_string(const Camera& c) {
   return text;
 }
 
+const char* up_option(const Camera& camera) { return camera.up.z > 0 ? " --up z" : ""; }
+
 glm::ivec2 parse_size(const std::string& text) {
   glm::ivec2 size(0);
   int used = 0;

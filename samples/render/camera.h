@@ -27,6 +27,8 @@ struct Camera {
 // Parses "X,Y,Z:X,Y,Z:FOV" (eye, target, vertical angle in degrees). Throws lsp::Failure (kUsage).
 Camera parse_camera(const std::string& text);
 std::string to_string(const Camera& camera);
+// What is said behind it where z is up: " --up z", else nothing.
+const char* up_option(const Camera& camera);
 // Parses "WIDTHxHEIGHT", in pixels. Throws lsp::Failure (kUsage).
 glm::ivec2 parse_size(const std::string& text);
 

@@ -96,9 +96,10 @@ void run_heat(const Arguments& arguments, const CommonOptions& common, const Ren
                      .dump(2)
               << "\n";
   } else if (!common.quiet) {
-    std::printf("%s: heat of %s, %d x %d, %u samples: mean %.4g a ray, white is %.4g; camera %s\n",
+    std::printf("%s: heat of %s, %d x %d, %u samples: mean %.4g a ray, white is %.4g; camera %s%s\n",
                 arguments.outputs.front().c_str(), arguments.heat.c_str(), options.width, options.height,
-                options.samples, map.mean, static_cast<double>(map.top), to_string(camera).c_str());
+                options.samples, map.mean, static_cast<double>(map.top), to_string(camera).c_str(),
+                up_option(camera));
   }
 }
 
@@ -168,9 +169,9 @@ void print_report(const Arguments& arguments, const CommonOptions& common, const
                 options.height, options.samples, arguments.effect.c_str(), arguments.mode.c_str(),
                 tracer.device().c_str());
     std::printf(
-        "%.2f s; indirect %.2f Mrays in %.2f s: %.2f Mrays/s; primary %.2f s, shadow %.2f s; camera %s\n",
+        "%.2f s; indirect %.2f Mrays in %.2f s: %.2f Mrays/s; primary %.2f s, shadow %.2f s; camera %s%s\n",
         report.seconds, static_cast<double>(report.indirect_rays) * 1e-6, report.indirect_seconds, rate,
-        report.primary_seconds, report.shadow_seconds, to_string(camera).c_str());
+        report.primary_seconds, report.shadow_seconds, to_string(camera).c_str(), up_option(camera));
   }
 }
 
@@ -285,7 +286,7 @@ int main(int argc, char** argv) {
   app.add_flag("--denoise", a.options.denoise, "Filter the noise of few samples out of the picture");
   app.add_option(
          "--up", a.up,
-         "Which axis is up: y or z (default y; without --camera z for a scene that lies flat in x and y)")
+         "Which axis is up: y or z (default y; without --camera as shape and source suggest, z with a note)")
       ->check(CLI::IsMember({"y", "z"}));
   app.add_option("--sun", a.sun, "Direction towards the sun");
   app.add_option("--exposure", a.exposure,

@@ -170,8 +170,8 @@ void report(const ViewReport& r, const ViewState& state, const Arguments& argume
                      .dump(2)
               << "\n";
   } else if (!common.quiet) {
-    std::printf("%s, %s\n%s\ncamera %s\n", arguments.file.c_str(), gpu.properties.deviceName,
-                figures(r, state, scene).c_str(), to_string(state.camera).c_str());
+    std::printf("%s, %s\n%s\ncamera %s%s\n", arguments.file.c_str(), gpu.properties.deviceName,
+                figures(r, state, scene).c_str(), to_string(state.camera).c_str(), up_option(state.camera));
   }
 }
 
@@ -300,7 +300,7 @@ int main(int argc, char** argv) {
                  "X,Y,Z:X,Y,Z:FOV, the vertical angle in degrees (default: from the scene)");
   app.add_option(
          "--up", a.up,
-         "Which axis is up: y or z (default y; without --camera z for a scene that lies flat in x and y)")
+         "Which axis is up: y or z (default y; without --camera as shape and source suggest, z with a note)")
       ->check(CLI::IsMember({"y", "z"}));
   app.add_option("--size", a.size, "Of the window, in pixels (default 960x540)");
   app.add_option("--radius", a.state.ao_distance,

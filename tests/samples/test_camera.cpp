@@ -331,6 +331,12 @@ TEST_F(DefaultView, TheAxisIsThatOfTheSource) {
   bake(cube, "mesh.stl");
   EXPECT_EQ(render().at("up"), "z");
   EXPECT_NE(errors().find("comes from .stl: z is taken to be up"), std::string::npos) << errors();
+  ASSERT_EQ(run("lsp-render " + file("mesh.lsp") + " -o " + file("x.png") + " --size 8x8 --samples 1 > " +
+                file("out") + " 2>/dev/null"),
+            0);
+  std::ifstream out(folder_ / "out");
+  const std::string said{std::istreambuf_iterator<char>(out), {}};
+  EXPECT_NE(said.find(":38 --up z\n"), std::string::npos) << "to be given again: " << said;
   EXPECT_EQ(render("--up y").at("up"), "y");
   Mesh terrain;
   terrain.add_terrain(0.5f, false);
