@@ -477,7 +477,7 @@ types:
         type: u4
       - id: sub_first
         type: u4
-      - id: reserved
+      - id: closed
         type: u4
       - id: plane_first
         type: u4

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cells/closed_ways.h"
 #include "cells/dial.h"
 #include "lsp/program.h"
 #include "sites.h"
@@ -138,7 +139,10 @@ void fill_cells(BakeJob& job) {
                           with_commas(cells));
 }
 
-void finish_cells(BakeJob& job) { choose_dial(job.baked, job.options.cells_wrong); }
+void finish_cells(BakeJob& job) {
+  find_closed_ways(job.baked);
+  choose_dial(job.baked, job.options.cells_wrong);
+}
 
 void build_wide_base(BakeJob& job) { job.baked.header.base_structure = LSP_BASE_WIDE; }
 

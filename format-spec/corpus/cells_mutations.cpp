@@ -35,6 +35,8 @@ void break_cells(Collector& c) {
   cells(c, RuleId::kCellSplit, "a side is plane 1 of 1", [](Image& i) { i.splits[0].answers |= 1; });
   cells(c, RuleId::kCellRecord, "a plane is of triangle 14 of 14", [](Image& i) { i.plane_records[0] = 14; });
   cells(c, RuleId::kCellPlane, "a normal of length 2", [](Image& i) { i.planes[0].normal.y = 2; });
+  cells(c, RuleId::kCellClosed, "way 24 of 24 is closed",
+        [](Image& i) { i.filled_cells[0].closed |= 1u << LSP_WAYS; });
 }
 
 }  // namespace lsp::corpus

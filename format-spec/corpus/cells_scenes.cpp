@@ -64,4 +64,10 @@ Image full_cells_scene(bool exact) {
   return image;
 }
 
+Image closed_cells_scene() {
+  Image image = full_cells_scene();
+  image.filled_cells[0].closed = (1u << LSP_WAYS) - 1 - (1u << LSP_WAY(3u, 0u));  // but for a hole upwards
+  return image;
+}
+
 }  // namespace lsp::corpus

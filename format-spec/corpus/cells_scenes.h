@@ -9,4 +9,7 @@ namespace lsp::corpus {
 // plane, one split, a tree of three nodes. `exact`: with what exact rays need.
 Image full_cells_scene(bool exact = true);
 
+// The same, of which rays that miss are traced again.
+Image closed_cells_scene();
+
 }  // namespace lsp::corpus

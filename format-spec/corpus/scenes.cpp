@@ -273,6 +273,7 @@ std::vector<ValidFile> valid_files() {
   add("cells", "cells beside a BVH", encode(full_cells_scene()));
   add("cells-tables", "cells alone: tables and the triangles of their planes",
       encode(full_cells_scene(false)));
+  add("cells-closed", "cells that most rays do not leave the scene from", encode(closed_cells_scene()));
   add("wide", "cells beside wide nodes, three levels of them", encode(full_wide_scene()));
   add("wide-packed", "the same, packed", packed(full_wide_scene()));
   add("wide-alone", "wide nodes without cells", encode(wide_alone_scene()));

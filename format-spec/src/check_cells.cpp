@@ -107,6 +107,9 @@ class CellCheck {
         find(RuleId::kCellOwned, Kind::kCelt, i, sizeof c,
              "its sub-cells, planes or splits do not follow those of the cell before, or are too many");
       }
+      if (c.closed >> LSP_WAYS != 0)
+        find(RuleId::kCellClosed, Kind::kCelt, i, sizeof c,
+             "closed is " + std::to_string(c.closed) + ", of " + std::to_string(LSP_WAYS) + " ways");
       subs += uint64_t(std::popcount(mask));
       planes += c.plane_count;
       splits += c.split_count;

@@ -180,7 +180,7 @@ template <>
 struct Fields<LspFilledCell> {
   using Owner = LspFilledCell;
   static constexpr Field list[] = {LSP_FIELD(sub_mask_lo), LSP_FIELD(sub_mask_hi),     LSP_FIELD(sub_first),
-                                   LSP_FIELD(reserved),    LSP_FIELD(plane_first),     LSP_FIELD(plane_count),
+                                   LSP_FIELD(closed),      LSP_FIELD(plane_first),     LSP_FIELD(plane_count),
                                    LSP_FIELD(split_first), LSP_FIELD(split_count),     LSP_FIELD(root),
                                    LSP_FIELD(node_first),  LSP_FIELD(reference_first), LSP_FIELD(max_steps)};
 };

@@ -36,6 +36,9 @@ namespace {
 // Exact traces that take turns. With 16 it is the same, and asking for more of a tree before does not help.
 constexpr size_t kTurns = 8;
 
+// A ray's doubt_: a miss of it is a mistake, and it was one (LspWalk.closed, .again).
+constexpr uint32_t kClosed = 1, kAgain = 2;
+
 // A hit whose triangle was asked for.
 struct Found {
   uint32_t ray;
@@ -58,7 +61,7 @@ struct Tracer {
   template <typename T>
   using Lanes = T[kPool + kLanes];
   size_t n = 0;
-  Lanes<uint32_t> ray_{}, step_{};
+  Lanes<uint32_t> ray_{}, step_{}, doubt_{};
   Lanes<float> origin_[3]{}, direction_[3]{}, inverse_[3]{}, tmin_{}, tmax_{}, t_{}, t_last_{};
   Lanes<int32_t> cell_[3]{}, axis_{};
   // Of a round: where a ray goes next, its entry and its place there, its plane.
@@ -164,6 +167,7 @@ struct Tracer {
     store(last, tmax_ + i);
     store(number, ray_ + i);
     store(hn::Zero(du), step_ + i);
+    store(hn::Zero(du), doubt_ + i);
     begin(i, first, last, valid);
   }
 
@@ -188,10 +192,28 @@ struct Tracer {
                                        select(as_int(hn::Eq(t_in, enters.y)), set_i(1), set_i(2)));
     store(select(as_int(outside), side, set_i(LSP_NONE)), axis_ + i);
     const V3 p = point_at(o, load_3(direction_, i), begins);
-    const VF half = set(0.5f);
-    store(hn::ConvertTo(di, min_of(max_of(zero, p.x), hn::Sub(dims.x, half))), cell_[0] + i);
-    store(hn::ConvertTo(di, min_of(max_of(zero, p.y), hn::Sub(dims.y, half))), cell_[1] + i);
-    store(hn::ConvertTo(di, min_of(max_of(zero, p.z), hn::Sub(dims.z, half))), cell_[2] + i);
+    store(cell_at(p.x, grid.cells_x), cell_[0] + i);
+    store(cell_at(p.y, grid.cells_y), cell_[1] + i);
+    store(cell_at(p.z, grid.cells_z), cell_[2] + i);
+  }
+
+  // lsp_cell_at, along an axis of `cells`.
+  static HWY_INLINE VI cell_at(VF p, uint32_t cells) {
+    return hn::ConvertTo(di, min_of(max_of(hn::Zero(df), p), set(static_cast<float>(cells) - 0.5f)));
+  }
+
+  // Rays that missed where that is a mistake go on from where they began, see lsp_advance.
+  HWY_NOINLINE void doubt(size_t i, Bits doubted) {
+    const VF t = load(tmin_ + i);
+    const V3 p = point_at(load_3(origin_, i), load_3(direction_, i), t);
+    const MF these = mask_of(doubted);
+    const uint32_t cells[3] = {grid.cells_x, grid.cells_y, grid.cells_z};
+    const VF at[3] = {p.x, p.y, p.z};
+    for (size_t k = 0; k < 3; ++k)
+      store(select(as_int(these), cell_at(at[k], cells[k]), load(next_cell[k] + i)), next_cell[k] + i);
+    store(select(these, t, load(t_out + i)), t_out + i);
+    store(select(as_uint(these), set_u(kAgain), load(doubt_ + i)), doubt_ + i);
+    store(select(as_uint(these), set_u(LSP_NONE), load(step_ + i)), step_ + i);  // compact adds one
   }
 
   // A vector of new rays at a time.
@@ -234,6 +256,15 @@ struct Tracer {
     const VU at = hn::Add(hn::Mul(hn::Add(hn::Mul(table, set_u(6)), hn::BitCast(du, face)),
                                   set_u(grid.origin_patches * grid.origin_patches)),
                           patch);
+    const auto second_half = [&](VF q, uint32_t bit) HWY_ATTR {
+      return hn::IfThenElseZero(as_uint(hn::Ge(hn::Add(q, q), patches)), set_u(bit));
+    };
+    const VU quarter = hn::Add(second_half(patch_u, 1), second_half(patch_v, 2));
+    const VU way = hn::Add(hn::ShiftLeft<2>(hn::BitCast(du, face)), quarter);
+    const MU ends_outside = as_uint(hn::Lt(load(t_last_ + i), load(tmax_ + i)));
+    const VU closed =
+        hn::And(hn::Shr(record[3], hn::And(way, set_u(31))), set_u(dial == LSP_DIAL_TABLES ? 0 : kClosed));
+    store(hn::IfThenElseZero(ends_outside, closed), doubt_ + i);
     const MU none = hn::Eq(hn::And(mask, bit), hn::Zero(du));
     return select(none, set_u(LSP_NONE), hn::Add(set_u(grid.origin_entry_first), at));
   }
@@ -278,10 +309,13 @@ struct Tracer {
                                       hn::Lt(hn::BitCast(du, y), set_u(grid.cells_y))),
                               hn::Lt(hn::BitCast(du, z), set_u(grid.cells_z)));
     const MF going = hn::And(hn::And(here, as_float(hn::And(in_time, inside))), hn::Lt(t, load(t_last_ + i)));
+    Bits doubted = 0;
     if (const Bits ended = bits_of(hn::AndNot(going, here)); ended != 0) {
       const Bits complete = bits_of(as_float(in_time));
-      LSP_FOR_BITS(k, ended) end(ray_[i + k], (complete >> k & 1) != 0 ? 0 : LSP_HIT_INCOMPLETE);
-      over |= ended << i;
+      doubted = ended & complete & bits_of(as_float(hn::Eq(load(doubt_ + i), set_u(kClosed))));
+      LSP_FOR_BITS(k, ended & ~doubted)
+      end(ray_[i + k], (complete >> k & 1) != 0 ? 0 : LSP_HIT_INCOMPLETE);
+      over |= (ended & ~doubted) << i;
     }
     const VI of_grid = hn::Add(hn::Mul(hn::Add(hn::Mul(z, set_i(grid.cells_y)), y), set_i(grid.cells_x)), x);
     const VU word = load_words(scene.cell_words, hn::BitCast(du, of_grid), as_uint(going));
@@ -314,6 +348,7 @@ struct Tracer {
     next(z, point.z, hn::Not(hn::Or(out_x, out_y)), 2);
     store(t_to, t_out + i);
     store(axis_to, axis_out + i);
+    if (doubted != 0) doubt(i, doubted);
     const MF looks = as_float(is_filled);
     const Bits look_bits = bits_of(looks);
     if (look_bits == 0) return;
@@ -386,12 +421,14 @@ struct Tracer {
     const MF begins = as_float(hn::Lt(load(axis_ + i), hn::Zero(di)));
     said =
         select(as_uint(mask_of(unknown >> i)), hn::Or(said, set_u(LSP_LOSS_UNKNOWN << LSP_LOSS_SHIFT)), said);
-    const VU limit = select(as_uint(begins), set_u(dial & 0xFFu), set_u(dial >> 8u));
+    const VU limit = hn::IfThenZeroElse(hn::Eq(load(doubt_ + i), set_u(kAgain)),
+                                        select(as_uint(begins), set_u(dial & 0xFFu), set_u(dial >> 8u)));
     const MF exactly = hn::AndNot(as_float(hn::Lt(hn::ShiftRight<LSP_LOSS_SHIFT>(said), limit)), looks);
     const VU answer = hn::And(said, set_u(LSP_ANSWER_MASK));
     const MF answers = hn::AndNot(exactly, hn::And(looks, as_float(hn::Lt(answer, set_u(LSP_ANSWER_LIMIT)))));
-    const Bits sky =
-        bits_of(hn::AndNot(exactly, hn::And(looks, as_float(hn::Eq(answer, set_u(LSP_ANSWER_SKY))))));
+    const MU is_sky =
+        hn::And(hn::Eq(answer, set_u(LSP_ANSWER_SKY)), hn::Ne(load(doubt_ + i), set_u(kClosed)));
+    const Bits sky = bits_of(hn::AndNot(exactly, hn::And(looks, as_float(is_sky))));
     LSP_FOR_BITS(k, sky) end(ray_[i + k], 0);
     over |= sky << i;
     const Bits exact_bits = bits_of(exactly);
@@ -597,6 +634,7 @@ struct Tracer {
       move(t_out, t_, i, at, of_f);
       move(axis_out, axis_, i, at, of_i);
       move(ray_, ray_, i, at, of_u);
+      move(doubt_, doubt_, i, at, of_u);
       store(hn::Add(hn::TableLookupLanes(load(step_ + i), of_u), set_u(1)), step_ + at);
       at += static_cast<size_t>(std::popcount(on));
     }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -131,6 +132,65 @@ TEST(Cells, QualitiesErrAsTheBakePromises) {
   EXPECT_LE(balanced, 0.012);
   EXPECT_LE(accurate, 0.006);
   EXPECT_LE(balanced, fast);
+}
+
+size_t leaving(const std::vector<LspHit>& hits) {
+  return size_t(
+      std::count_if(hits.begin(), hits.end(), [](const LspHit& h) { return h.primitive == LSP_NONE; }));
+}
+
+// A scene whose cells say that every way leads to the sky.
+class Open {
+ public:
+  explicit Open(const lsp::Baked& baked) : cells_(baked.cell_tables.cells), scene_(view(baked)) {
+    for (LspFilledCell& cell : cells_) cell.closed = 0;
+    scene_.filled_cells = cells_.data();
+  }
+  const lsp_scene& scene() const { return scene_; }
+
+ private:
+  std::vector<LspFilledCell> cells_;
+  lsp_scene scene_;
+};
+
+// All rays begin within its walls, which are single triangles: the tables know what lies on both sides of
+// them.
+TEST(Cells, AClosedRoomKeepsItsRays) {
+  const std::vector<LspRay> rays = surface_rays(baked_room(), 12500, 8);
+  ASSERT_EQ(leaving(trace(view(baked_room()), {0, 0}, rays)), 0u);
+  EXPECT_EQ(leaving(trace(view(baked_room()), tables_but(0), rays)), 0u);
+  const Open open(baked_room());
+  EXPECT_GT(leaving(trace(open.scene(), tables_but(20), rays)), rays.size() / 1000) << "nothing to prevent";
+  EXPECT_LE(leaving(trace(view(baked_room()), tables_but(20), rays)), rays.size() / 10000);
+  const lsp_trace_options balanced{LSP_TRACE_APPROXIMATE, 0, LSP_QUALITY_BALANCED, 0};
+  EXPECT_LE(leaving(trace(view(baked_room()), balanced, rays)), rays.size() / 10000);
+}
+
+// A ray from the ball that ends before the walls has not left the room.
+TEST(Cells, ShortRaysOfAClosedRoomAreNotTracedAgain) {
+  std::vector<LspRay> rays = surface_rays(baked_room(), 40000, 1);
+  std::erase_if(rays, [](const LspRay& r) {
+    return std::max({std::fabs(r.origin.x), std::fabs(r.origin.y), std::fabs(r.origin.z)}) > 1.1f;
+  });
+  for (LspRay& r : rays) r.tmax = 0.2f;
+  const Open open(baked_room());
+  lsp_trace_counts with{}, without{};
+  EXPECT_TRUE(same_bits(trace(view(baked_room()), tables_but(20), rays, &with),
+                        trace(open.scene(), tables_but(20), rays, &without)));
+  EXPECT_GT(rays.size(), 1000u);
+  EXPECT_EQ(with.exact, without.exact);
+}
+
+// Rays from a ball that nothing surrounds leave the scene, and nobody doubts it.
+TEST(Cells, WaysToTheSkyAreOpen) {
+  const lsp::Baked ball = bake(sphere(24), options_of_cells());
+  const Open open(ball);
+  const std::vector<LspRay> rays = surface_rays(ball, 20000, 1);
+  lsp_trace_counts with{}, without{};
+  trace(view(ball), tables_but(20), rays, &with);
+  trace(open.scene(), tables_but(20), rays, &without);
+  EXPECT_GE(with.exact, without.exact);
+  EXPECT_LE(with.exact - without.exact, rays.size() / 20);
 }
 
 TEST(Cells, ExactRaysAreThoseOfABvh) {

@@ -55,6 +55,10 @@ std::vector<Scene> scenes(bool cells) {
   Mesh apart = sphere(6);
   add_triangle(apart, {40, -20, -20}, {40, 20, -20}, {40, 0, 30});
   made.push_back({"far apart", of(apart, 24)});
+  // Nothing leaves it, but tables may think so.
+  Mesh inside = sphere(12);
+  for (auto& t : inside.triangles) std::swap(t[1], t[2]);
+  made.push_back({"inside of a ball", of(inside, 5)});
   // Leaves that are there in part, on a ball.
   Mesh leaves = soup(300, 0.5f);
   leaves.materials.resize(3);

@@ -6,6 +6,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "cells/closed_ways.h"
 #include "cells/dial.h"
 #include "figures.h"
 #include "file.h"
@@ -75,6 +76,7 @@ void print_report(const Arguments& a, const Merged& done) {
 
 // What bake() and lsp-bake do once the tables are there. `file` is named where they err more than they may.
 MeasuredError finish(Baked& baked, PartSettings& settings, const std::string& file) {
+  find_closed_ways(baked);
   choose_dial(baked, settings.accuracy.wrong);
   if (settings.accuracy.weighed && weigh_tables(baked)) {
     settings.meta["options"]["base"] = "wide";

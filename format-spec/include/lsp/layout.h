@@ -37,7 +37,7 @@ typedef struct lsp_float3 {
 
 /* Version of the format (not of the programs). A reader refuses another major version. */
 #define LSP_VERSION_MAJOR 2u
-#define LSP_VERSION_MINOR 4u
+#define LSP_VERSION_MINOR 5u
 
 /* First eight bytes: 89 'L' 'S' 'P' 0D 0A 1A 0A, as two little-endian words. Catches text-mode transfers. */
 #define LSP_MAGIC_0 0x50534C89u
@@ -299,7 +299,7 @@ LSP_BEGIN(LspFilledCell)
   LSP_UINT sub_mask_lo; /* which sub-cells hold surface, and have an origin table: bit x + n * (y + n * z) */
   LSP_UINT sub_mask_hi;
   LSP_UINT sub_first; /* number of the first of its origin tables, which follow one another by their bits */
-  LSP_UINT reserved;  /* zero */
+  LSP_UINT closed;    /* ways out of the cell that do not lead out of the scene, bits LSP_WAY; since 2.5 */
   LSP_UINT plane_first;
   LSP_UINT plane_count; /* answers from this on are splits */
   LSP_UINT split_first;
@@ -309,6 +309,14 @@ LSP_BEGIN(LspFilledCell)
   LSP_UINT reference_first; /* and its leaves' references from here */
   LSP_UINT max_steps;       /* nodes that an exact trace of the cell visits at most */
 LSP_END(LspFilledCell)
+
+/* A way out of a cell: a face, 2 * axis + side, and a quarter of it. The bit of LspFilledCell.closed is set where hardly a
+ * ray that begins in the cell and leaves it that way leaves the scene: one that misses everything is a mistake of the
+ * tables then. */
+#define LSP_WAY(face, quarter) (4u * (face) + (quarter))
+#define LSP_WAYS 24u
+/* The quarter of the patch (u, v) of m * m. */
+#define LSP_QUARTER(u, v, m) ((2u * (u) >= (m) ? 1u : 0u) + (2u * (v) >= (m) ? 2u : 0u))
 
 /* CENT has the entries, 16 bits, two in a word, the lower half first: of every filled cell the 30 N^4 shafts of its
  * far table (LSP_SHAFT_INDEX), then of every origin table, by face 2 * axis + side and patch u + M * v of the cell

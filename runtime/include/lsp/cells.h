@@ -6,7 +6,8 @@
  * the origin table of its sub-cell, in others the far table, which is the paper's Line Space (section 3.1). An entry
  * is empty, a plane, or a split: two answers, and a linear form over the ray's place in the shaft whose sign chooses.
  * An entry that loses more than asked for is not heeded: the ray is traced exactly through this cell, in the cell's
- * own small tree, and goes on from there.
+ * own small tree, and goes on from there. A ray that misses everything, but leaves the cell it begins in by a way on
+ * which the bake found no sky (LspFilledCell.closed), begins again, and every cell is traced exactly.
  *
  * runtime/src/trace_cells_wide.cpp and wide_exact-inl.h state this a second time for rays in vector lanes, operation by
  * operation: what changes here changes there.
@@ -36,6 +37,8 @@ struct LspWalk {
   ivec3 exact_cell; /* of ref; it has come out of it at t */
   float exact_t;    /* where it entered that */
   uint step;
+  bool closed; /* it begins where no ray leaves the scene: a miss is a mistake */
+  bool again;  /* it was one: every cell is traced exactly, from the beginning on */
   bool any_hit;
   LspCounts counts;
 };
@@ -59,6 +62,17 @@ LSP_FN LspCellRay lsp_cell_ray(LspCellGrid grid, LspSetup s) {
   r.inverse = inverse;
   r.ahead = ivec3(inverse.x < 0.0f ? 0 : 1, inverse.y < 0.0f ? 0 : 1, inverse.z < 0.0f ? 0 : 1);
   return r;
+}
+
+LSP_FN vec3 lsp_cell_dims(LspCellGrid grid) {
+  return vec3(float(grid.cells_x), float(grid.cells_y), float(grid.cells_z));
+}
+
+/* The cell that a point lies in or is nearest to; of a damaged file it is perhaps no number: then 0 is the larger. */
+LSP_FN ivec3 lsp_cell_at(LspCellGrid grid, vec3 p) {
+  vec3 dims = lsp_cell_dims(grid);
+  return ivec3(int(lsp_min(lsp_max(0.0f, p.x), dims.x - 0.5f)), int(lsp_min(lsp_max(0.0f, p.y), dims.y - 0.5f)),
+               int(lsp_min(lsp_max(0.0f, p.z), dims.z - 0.5f)));
 }
 
 LSP_FN vec3 lsp_cell_point(LspCellRay r, float t) {
@@ -95,13 +109,12 @@ struct LspCellLook {
   uint entry; /* LSP_NONE: there is none */
   vec4 place;
   float place_4;
+  bool closed; /* of an origin table: LspFilledCell.closed has the way out */
 };
 
 /* In the origin table of the sub-cell that a ray begins in, at `from`; it leaves the cell at `to`. Both are seen from
  * the cell's lower corner. */
-LSP_FN LspCellLook lsp_cell_origin(LspScene scene, LspCellGrid grid, uint index, vec3 from, vec3 to, int axis,
-                                   uint face) {
-  LspFilledCell cell = lsp_load_cell_origins(scene, index);
+LSP_FN LspCellLook lsp_cell_origin(LspCellGrid grid, LspFilledCell cell, vec3 from, vec3 to, int axis, uint face) {
   float n = float(grid.sub_cells);
   float m = float(grid.origin_patches);
   precise vec3 p = from * n;
@@ -112,6 +125,7 @@ LSP_FN LspCellLook lsp_cell_origin(LspScene scene, LspCellGrid grid, uint index,
   float patch_u = lsp_cell_patch(u, m);
   float patch_v = lsp_cell_patch(v, m);
   LspCellLook look;
+  look.closed = ((cell.closed >> LSP_WAY(face, LSP_QUARTER(uint(patch_u), uint(patch_v), grid.origin_patches))) & 1u) != 0u;
   look.place = vec4(lsp_cell_place(p.x, sub.x), lsp_cell_place(p.y, sub.y), lsp_cell_place(p.z, sub.z),
                     lsp_cell_place(u, patch_u));
   look.place_4 = lsp_cell_place(v, patch_v);
@@ -140,6 +154,7 @@ LSP_FN LspCellLook lsp_cell_far(LspCellGrid grid, uint index, vec3 from, vec3 to
   look.place = vec4(lsp_cell_place(in_u, first.x), lsp_cell_place(in_v, first.y), lsp_cell_place(out_u, first.z),
                     lsp_cell_place(out_v, first.w));
   look.place_4 = 0.0f;
+  look.closed = false;
   uint patches = grid.far_patches * grid.far_patches;
   uint shaft = LSP_SHAFT_INDEX(face_in, face_out, uint(first.x) + grid.far_patches * uint(first.y),
                                uint(first.z) + grid.far_patches * uint(first.w), grid.far_patches);
@@ -228,8 +243,9 @@ LSP_STEP bool lsp_cell_answer(LspScene scene, LspSetup s, LspQuery q, LspCellRay
                               LspCellLook look, ivec3 cell, bool begins, float t, float t_out) {
   lsp_walk.counts.shafts += 1u;
   uint answer = entry & LSP_ANSWER_MASK;
-  bool exactly = (LSP_PARTS & LSP_PART_CELL_EXACT) != 0u && (entry >> LSP_LOSS_SHIFT) >= (begins ? q.dial & 0xFFu : q.dial >> 8u);
-  bool over = answer == LSP_ANSWER_SKY;
+  bool exactly = (LSP_PARTS & LSP_PART_CELL_EXACT) != 0u &&
+                 (lsp_walk.again || (entry >> LSP_LOSS_SHIFT) >= (begins ? q.dial & 0xFFu : q.dial >> 8u));
+  bool over = answer == LSP_ANSWER_SKY && !lsp_walk.closed;
   if (!exactly && answer < LSP_ANSWER_LIMIT) {
     LspFilledCell answers = lsp_load_cell_answers(scene, index);
     lsp_walk.counts.splits += answer < answers.plane_count ? 0u : 1u;
@@ -269,7 +285,7 @@ LSP_STEP bool lsp_cell_answer(LspScene scene, LspSetup s, LspQuery q, LspCellRay
 LSP_STEP void lsp_begin(LspScene scene, LspSetup s, LspQuery q) {
   LspCellGrid grid = lsp_load_header(scene).cells;
   LspCellRay r = lsp_cell_ray(grid, s);
-  vec3 dims = vec3(float(grid.cells_x), float(grid.cells_y), float(grid.cells_z));
+  vec3 dims = lsp_cell_dims(grid);
   precise vec3 a = (vec3(0.0f, 0.0f, 0.0f) - r.origin) * r.inverse;
   precise vec3 b = (dims - r.origin) * r.inverse;
   vec3 first = vec3(lsp_min(a.x, b.x), lsp_min(a.y, b.y), lsp_min(a.z, b.z));
@@ -279,13 +295,14 @@ LSP_STEP void lsp_begin(LspScene scene, LspSetup s, LspQuery q) {
   lsp_walk.t_last = lsp_min(lsp_min(lsp_min(last.x, last.y), last.z), s.tmax);
   lsp_walk.t = outside ? t_in : s.tmin;
   lsp_walk.axis = !outside ? -1 : (t_in == first.x ? 0 : (t_in == first.y ? 1 : 2));
-  vec3 p = lsp_cell_point(r, lsp_walk.t); /* of a damaged file perhaps no number: then 0 is the larger */
-  lsp_walk.cell = ivec3(int(lsp_min(lsp_max(0.0f, p.x), dims.x - 0.5f)), int(lsp_min(lsp_max(0.0f, p.y), dims.y - 0.5f)),
-                 int(lsp_min(lsp_max(0.0f, p.z), dims.z - 0.5f)));
+  vec3 p = lsp_cell_point(r, lsp_walk.t);
+  lsp_walk.cell = lsp_cell_at(grid, p);
   lsp_walk.ref = lsp_walk.t < lsp_walk.t_last ? 0u : LSP_NONE;
   lsp_walk.exact_cell = lsp_walk.cell;
   lsp_walk.exact_t = lsp_walk.t;
   lsp_walk.step = 0u;
+  lsp_walk.closed = false;
+  lsp_walk.again = false;
   lsp_walk.best = lsp_no_best(s);
   lsp_walk.any_hit = (q.flags & LSP_TRACE_ANY_HIT) != 0u;
   lsp_walk.counts = lsp_no_counts();
@@ -301,7 +318,10 @@ LSP_STEP void lsp_begin(LspScene scene, LspSetup s, LspQuery q) {
     uint index = word & ~LSP_CELL_FILLED;
     vec3 corner = lsp_cell_corner(cell);
     uint face_out = 2u * uint(pass.axis_out) + lsp_ahead(r, pass.axis_out);
-    LspCellLook look = lsp_cell_origin(scene, grid, index, p - corner, pass.to - corner, pass.axis_out, face_out);
+    LspCellLook look = lsp_cell_origin(grid, lsp_load_cell_origins(scene, index), p - corner, pass.to - corner,
+                                       pass.axis_out, face_out);
+    /* A ray that ends within the grid may miss what is beyond. */
+    lsp_walk.closed = (LSP_PARTS & LSP_PART_CELL_EXACT) != 0u && q.dial != LSP_DIAL_TABLES && look.closed && lsp_walk.t_last < s.tmax;
     /* Where no surface is near its beginning there is no origin table: nobody knows what the far one loses. */
     uint loss = look.entry == LSP_NONE ? LSP_LOSS_UNKNOWN << LSP_LOSS_SHIFT : 0u;
     if (look.entry == LSP_NONE) look = lsp_cell_through(grid, index, r, cell, pass.to - corner, pass.axis_out, face_out);
@@ -322,13 +342,21 @@ LSP_STEP void lsp_advance(LspScene scene, LspSetup s, LspQuery q) {
   LspCellRay r = lsp_cell_ray(grid, s);
   uint most = grid.cells_x + grid.cells_y + grid.cells_z;
   bool over = lsp_walk.best.triangle != LSP_NONE;
-  uint before = lsp_walk.step;
   while (!over && lsp_walk.ref == 0u && lsp_walk.step < most) {
     ivec3 cell = lsp_walk.cell;
     float t = lsp_walk.t;
     over = !(t < lsp_walk.t_last) || uint(cell.x) >= grid.cells_x || uint(cell.y) >= grid.cells_y || uint(cell.z) >= grid.cells_z;
+    if (over && lsp_walk.closed) {
+      over = false;
+      lsp_walk.closed = false;
+      lsp_walk.again = true;
+      lsp_walk.step = 0u;
+      t = s.tmin;
+      cell = lsp_cell_at(grid, lsp_cell_point(r, t));
+    }
     if (over) break;
     lsp_walk.step += 1u;
+    lsp_walk.counts.nodes += 1u;
     uint word = lsp_load_cell_word(scene, (uint(cell.z) * grid.cells_y + uint(cell.y)) * grid.cells_x + uint(cell.x));
     bool filled = (word & LSP_CELL_FILLED) != 0u;
     LspCellPassage pass = lsp_cell_pass(r, cell, filled ? 0 : int(word & LSP_CELL_MAX_JUMP), t);
@@ -346,7 +374,6 @@ LSP_STEP void lsp_advance(LspScene scene, LspSetup s, LspQuery q) {
     lsp_walk.t = pass.t_out;
     lsp_walk.axis = pass.axis_out;
   }
-  lsp_walk.counts.nodes += lsp_walk.step - before;
   if (over) lsp_stack_ref[0] = LSP_NONE;
   if (lsp_walk.ref == 0u) lsp_walk.ref = LSP_NONE;
 }
