@@ -2,6 +2,7 @@
 #include "mesh_files.h"
 
 #include <algorithm>
+#include <bit>
 #include <chrono>
 
 #include "import/polygons.h"
@@ -801,12 +802,21 @@ TEST_F(Off, ColoursOfVerticesAndFaces) {
 }
 
 TEST_F(Off, Refusals) {
-  EXPECT_EQ(refusal("a.off", "OFF BINARY\n1 2 3\n").exit, Exit::kUnsupported);
   EXPECT_EQ(refusal("a.off", "nOFF\n4\n").exit, Exit::kUnsupported);
   EXPECT_EQ(refusal("a.off", "OFF\n2000000000 1 0\n0 0 0\n").exit, Exit::kInvalid);
   EXPECT_EQ(refusal("a.off", "OFF\n1 1 0\n0 0 0\n2000000000 0 0 0\n").exit, Exit::kInvalid);
   EXPECT_EQ(refusal("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n").exit, Exit::kInvalid);
   EXPECT_EQ(refusal("a.off", "solid\n").exit, Exit::kInvalid);
+}
+
+std::string binary_off() {
+  std::string bytes = "COFF BINARY\n";
+  const auto add = [&](uint32_t word) { append(bytes, __builtin_bswap32(word)); };
+  for (const uint32_t count : {3u, 1u, 0u}) add(count);
+  for (const float value : {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 0, 1, 0, 1, 0, 1, 0, 0, 1})
+    add(std::bit_cast<uint32_t>(value));
+  for (const uint32_t word : {3u, 0u, 1u, 2u, 0u}) add(word);
+  return bytes;
 }
 
 // No prefix of a file and no changed byte may do more than be refused.
@@ -817,7 +827,8 @@ TEST_F(AnyFormat, DamagedFilesAreReadOrRefused) {
       {"c.ply",
        ply("ascii", "9 0 0 3 1 1\n9 1 0 3 0\n9 1 1 3 0\n9 0 1 3 0\n7\n1 4 0 1 2 3 .25\n1 3 0 1 2 .25\n")},
       {"d.stl", binary_stl("", 2, 2)},
-      {"e.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"}};
+      {"e.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"},
+      {"f.off", binary_off()}};
   uint32_t seed = 7;
   const auto random = [&](size_t below) { return (seed = seed * 1664525u + 1013904223u) % uint32_t(below); };
   const lsp::ImportOptions options{.memory_limit = 64 << 20};
