@@ -265,7 +265,7 @@ class GltfReader {
     std::map<uint32_t, uint32_t> materials;  // from the builder's to those of the asset
     for (const GltfPrimitive& primitive : primitives(node)) {
       const auto [at, fresh] = materials.try_emplace(primitive.material, 0);
-      if (fresh) at->second = asset.add_material(builder_.mesh().materials[primitive.material]);
+      if (fresh) at->second = asset.add_material(document_->file, builder_.mesh().materials[primitive.material]);
       place(primitive, matrix, model_.nodes[size_t(node)].skin, asset, at->second);
     }
     return add_asset(*instances_, asset, mesh_name(node), true);

@@ -96,7 +96,7 @@ GltfMaterials::Entry GltfMaterials::read(const json& source, uint32_t known_id) 
   material.base_color = {factor[0], factor[1], factor[2]};
   material.opacity = alpha.coverage(1);
   Entry entry;
-  entry.id = known_id != kNoIndex ? known_id : builder_.add_material(material);
+  entry.id = known_id != kNoIndex ? known_id : builder_.add_material(document_.file, material);
   const Material& bounded = builder_.mesh().materials[entry.id];
   entry.surface = {bounded.base_color, bounded.emission, alpha, texture(*base, alpha), {}};
   if (bounded.emission != glm::vec3(0)) entry.surface.glow = texture(member(source, "emissiveTexture"), {});

@@ -78,6 +78,7 @@ class OffReader {
 
  private:
   void note_unread() {
+    if (const std::string odd = numbers_.note(); !odd.empty()) builder_.note(file_ + ": " + odd);
     if (vertex_values_left_)
       builder_.note(file_ + ": texture coordinates or other values behind those of vertices are not read");
     if (face_values_left_)
@@ -143,12 +144,12 @@ class OffReader {
 
   void read_vertex() {
     glm::dvec3 position;
-    for (int i = 0; i < 3; ++i) position[i] = number_of(word());
-    if (keyword_.homogeneous) position /= number_of(word());
+    for (int i = 0; i < 3; ++i) position[i] = numbers_.read(word());
+    if (keyword_.homogeneous) position /= numbers_.read(word());
     push(soup_.positions, position);
     if (keyword_.has_normals) {
       glm::vec3 normal;
-      for (int i = 0; i < 3; ++i) normal[i] = float(number_of(word()));
+      for (int i = 0; i < 3; ++i) normal[i] = float(numbers_.read(word()));
       push(soup_.normals, normal);
     }
     glm::vec3 color = kNoColor;
@@ -205,6 +206,7 @@ class OffReader {
   MeshBuilder& builder_;
   PolygonSoup soup_;
   OffKeyword keyword_;
+  NumberReader numbers_;
   bool colored_ = false;  // some face is
   bool vertex_values_left_ = false, face_values_left_ = false, translucent_ = false;
 };

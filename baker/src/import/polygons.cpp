@@ -228,6 +228,10 @@ void add_polygons(const std::string& file, const PolygonSoup& soup, MeshBuilder&
     cut_faces(file, soup, builder, [&](const Piece& piece) { add(piece, nullptr); });
   }
   builder.end();
+  if (soup.face_ends.empty() && soup.too_small == 0 && !soup.positions.empty()) {
+    builder.note(file + ": its " + std::to_string(soup.positions.size()) +
+                 " vertices have no faces, they are a cloud of points");
+  }
   if (soup.too_small) {
     builder.note(file + ": " + std::to_string(soup.too_small) +
                  " faces with fewer than three corners hold no triangle");
