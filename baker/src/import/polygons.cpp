@@ -9,12 +9,9 @@
 namespace lsp {
 namespace {
 
-// Point tests allowed for one file's concave polygons: seconds.
-constexpr uint64_t kEarWork = 300'000'000;
-
-double area2(const glm::dvec2& a, const glm::dvec2& b, const glm::dvec2& c) {
-  return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
-}
+// Steps allowed for one file's concave polygons: some for each corner, which are ten times what people's
+// take.
+constexpr uint64_t kEarWork = 300'000'000, kEarWorkACorner = 1'500;
 
 void fan(std::span<const uint32_t> ring, std::vector<glm::uvec3>& out) {
   for (size_t i = 2; i < ring.size(); ++i) out.push_back({ring[0], ring[i - 1], ring[i]});
@@ -129,7 +126,7 @@ template <typename Add>
 void cut_faces(const std::string& file, const PolygonSoup& soup, MeshBuilder& builder, const Add& add) {
   std::vector<glm::dvec3> polygon;
   std::vector<glm::uvec3> cut;
-  uint64_t work = kEarWork, crossed = 0;
+  uint64_t work = std::max(kEarWork, kEarWorkACorner * soup.corners.size()), crossed = 0;
   uint32_t begin = 0;
   for (uint32_t face = 0; face < soup.face_ends.size(); ++face) {
     const uint32_t end = soup.face_ends[face];

@@ -49,7 +49,7 @@ struct PolygonSoup {
 void add_polygons(const std::string& file, const PolygonSoup& soup, MeshBuilder& builder);
 
 // Cuts a polygon into corners.size() - 2 triangles of corner numbers, appended to `out`. Convex polygons (and
-// those without any area) become a fan from corner 0. `work` is what is left of the number of point tests
+// those without any area) become a fan from corner 0. `work` is what is left of the number of steps
 // allowed, so that hostile polygons cost bounded time; at 0 only fans are made.
 EarCut triangulate(std::span<const glm::dvec3> corners, std::vector<glm::uvec3>& out, uint64_t& work);
 
