@@ -34,17 +34,16 @@ int64_t image_of(const json& texture) {
 
 }  // namespace
 
+// The default material's members are those of an empty one.
 const GltfMaterials::Entry& GltfMaterials::at(uint32_t index) {
   const json& source = element(member(document_.looks, "materials"), index);
-  const auto [at, fresh] = materials_.try_emplace(source.is_null() ? kNoIndex : index);
+  const uint32_t key = source.is_null() ? kNoIndex : index;
+  if (key != index) note("primitives name materials that are not there, glTF's default holds for them");
+  const auto [at, fresh] = materials_.try_emplace(key);
   if (!fresh) return at->second;
-  if (source.is_null()) {
-    at->second.id = builder_.default_material();
-  } else {
-    const auto known = ids_.find(index);
-    at->second = read(source, known == ids_.end() ? kNoIndex : known->second);
-    ids_[index] = at->second.id;
-  }
+  const auto known = ids_.find(key);
+  at->second = read(source, known == ids_.end() ? kNoIndex : known->second);
+  ids_[key] = at->second.id;
   return at->second;
 }
 

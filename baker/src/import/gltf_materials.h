@@ -22,8 +22,7 @@ class GltfMaterials {
                 MeshBuilder& builder)
       : path_(path), document_(document), accessors_(accessors), builder_(builder) {}
 
-  // Made on first use; where the document has none by that number, glTF's default: the builder's id is then
-  // that of triangles without a material.
+  // Made on first use; where the document has none by that number, glTF's default (white, a rough metal).
   const Entry& at(uint32_t index);
 
   // Forgets the pictures where they have come to take much memory.
