@@ -1,4 +1,6 @@
 // glTF as exporters write it beside its letter: what is missing, left over, malformed or one of several.
+#include <limits>
+
 #include "gltf_builder.h"
 #include "png_bytes.h"
 
@@ -74,6 +76,18 @@ TEST_F(GltfVariants, AttributesShorterThanPositionsAreNoted) {
   textured.material()["pbrMetallicRoughness"]["baseColorTexture"]["index"] = 0;
   textured.primitive()["attributes"]["TEXCOORD_0"] = textured.values<float>({0, 0, 1, 0}, kFloat, "VEC2", 2);
   expect_note(textured, "fewer or more of TEXCOORD_0 than positions");
+}
+
+TEST_F(GltfVariants, TextureCoordinatesThatAreNotFiniteAreNoted) {
+  Square square;
+  square.root["images"] = {{{"bufferView", square.view(rgba_png(1, 1, {255, 0, 0, 255}))}}};
+  square.root["textures"] = {{{"source", 0}}};
+  square.material()["pbrMetallicRoughness"]["baseColorTexture"]["index"] = 0;
+  const float none = std::numeric_limits<float>::quiet_NaN();
+  square.primitive()["attributes"]["TEXCOORD_0"] =
+      square.values<float>({none, none, 1, 0, 1, 1, 0, 1}, kFloat, "VEC2", 2);
+  EXPECT_EQ(import(square).color(0).base_color, glm::vec3(1, 0, 0));
+  expect_note(square, "TEXCOORD_0 is not finite at some vertices");
 }
 
 TEST_F(GltfVariants, VerticesLeftOverAreNoted) {

@@ -403,6 +403,34 @@ TEST_F(Variants, MtlColoursBeyondTheirRangeAreCutWithANote) {
   EXPECT_TRUE(has_note(mesh, "cut to what their range permits"));
 }
 
+// Exporters write the colour of a socket that a texture feeds, which is black.
+TEST_F(Variants, MtlFactorsOfZeroBesideAMapAreOne) {
+  write("red.png", rgba_png(1, 1, {255, 0, 0, 255}));
+  write("a.mtl", "newmtl m\nKd 0 0 0\nmap_Kd red.png\nKe 0 0 0\nmap_Ke red.png\n");
+  const Mesh mesh =
+      import("a.obj", "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n");
+  EXPECT_EQ(mesh.color(0).base_color, glm::vec3(1, 0, 0));
+  EXPECT_EQ(mesh.color(0).emission, glm::vec3(1, 0, 0));
+  EXPECT_EQ(mesh.notes.size(), 2u);
+  EXPECT_TRUE(has_note(mesh, "Ke of 0 beside its map is taken as 1"));
+}
+
+TEST_F(Variants, ColoursALittleAboveOneAreNotBytes) {
+  const Mesh mesh = import("a.ply", ply(rgb("float"), "1.2 0.50196 0"));
+  expect_color(mesh, {1, kGrey128, 0});
+  EXPECT_TRUE(has_note(mesh, "colours above 1 are cut to it"));
+  EXPECT_TRUE(import("a.ply", ply(rgb("float"), "3 2 0")).notes.empty()) << "dark, of 255";
+}
+
+TEST_F(Variants, TextureCoordinatesThatAreNotFinite) {
+  write("red.png", rgba_png(2, 1, {255, 0, 0, 255, 0, 0, 255, 255}));
+  write("a.mtl", "newmtl m\nmap_Kd red.png\n");
+  const Mesh mesh =
+      import("a.obj", "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt nan nan\nf 1/1 2/1 3/1\n");
+  EXPECT_EQ(mesh.notes.size(), 1u);
+  EXPECT_TRUE(has_note(mesh, "or no finite ones, its corner texel holds"));
+}
+
 TEST_F(Variants, OffTexturesBehindAColourAreNoAlpha) {
   const Mesh mesh = import("a.off", off("STCOFF", "255 0 0 0.5 0.5"));
   expect_color(mesh, {1, 0, 0});

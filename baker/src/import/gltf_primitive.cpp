@@ -246,13 +246,16 @@ void GltfPrimitives::read_colors(const tinygltf::Primitive& source, const std::v
                     ", its corner texel holds");
     else
       note_missing(name, values, out);
+    if (std::any_of(values.floats.begin(), values.floats.end(), [](float x) { return !std::isfinite(x); }))
+      builder_.note(document_.file + ": " + name +
+                    " is not finite at some vertices, the corner texel holds there");
     return std::move(values.floats);
   };
   const std::vector<float> base = coordinates(surface.base), glow = coordinates(surface.glow);
   const size_t count = out.indices.size() / 3;
   builder_.budget().charge(document_.file, count, sizeof(TriangleColor));
   const auto place = [](const TextureUse& use, const std::vector<float>& list, size_t i) {
-    const bool there = 2 * i + 1 < list.size();
+    const bool there = 2 * i + 1 < list.size() && std::isfinite(list[2 * i] + list[2 * i + 1]);
     return use.place(there ? glm::dvec2(list[2 * i], list[2 * i + 1]) : glm::dvec2(0));
   };
   out.colors = mean_colors(surface, count, [&](size_t t, SurfaceCorner(&corners)[3]) {

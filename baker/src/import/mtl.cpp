@@ -116,8 +116,14 @@ void read_mtl(const std::filesystem::path& path, Budget& budget,
   MtlMaterial unnamed, *entry = &unnamed;
   bool rough_given = false, solid_given = false, color_given = false, emission_given = false;
   const auto end_material = [&] {
-    if (!color_given && !entry->color.file.empty()) entry->material.base_color = glm::vec3(1);
-    if (!emission_given && !entry->emission.file.empty()) entry->material.emission = glm::vec3(1);
+    const auto settle = [&](const char* name, bool given, const MtlMap& map, glm::vec3& factor) {
+      if (map.file.empty() || (given && factor != glm::vec3(0))) return;
+      if (given)
+        notes.insert(std::string(name) + " of 0 beside its map is taken as 1, it would leave nothing of it");
+      factor = glm::vec3(1);
+    };
+    settle("Kd", color_given, entry->color, entry->material.base_color);
+    settle("Ke", emission_given, entry->emission, entry->material.emission);
   };
   while (take_line(rest, line)) {
     if (!take_word(line, word)) continue;

@@ -32,14 +32,15 @@ struct PolygonSoup {
   std::vector<glm::vec3> colors;           // per position; linear once make_colors_linear() was called
   std::vector<glm::vec3> face_colors;      // per face, likewise
   std::map<uint32_t, Surface> surfaces;    // of materials with textures
+  bool colors_cut = false;                 // by make_colors_linear()
   uint64_t too_small = 0;                  // faces with fewer than three corners, not in the lists
 
   // Ends a face whose corners were appended since the last one. One with fewer than three is dropped and
   // counted: it holds no triangle. True where it was kept.
   bool end_face(const std::string& file, Budget& budget);
   uint64_t triangle_count() const;
-  // Colours, as files give them, are on the sRGB curve: from 0 to 255 where any is above 1, else from 0 to 1.
-  // What is no number (kNoColor) becomes white.
+  // Colours, as files give them, are on the sRGB curve: from 0 to 255 where any is above 2, else from 0 to 1,
+  // and what is a little above is cut. What is no number (kNoColor) becomes white.
   void make_colors_linear();
   bool has_colors() const { return !colors.empty() || !face_colors.empty() || !surfaces.empty(); }
 };
