@@ -246,7 +246,7 @@ SurfacePoint RenderScene::surface(const LspRay& ray, const LspHit& hit) const {
   point.base_color = glm::clamp(to_glm(m.base_color), 0.0f, 1.0f);
   point.emission = to_glm(m.emission);
   point.roughness = glm::clamp(m.roughness, 0.0f, 1.0f);
-  point.metallic = glm::clamp(m.metallic, 0.0f, 1.0f);
+  point.metallic = point.roughness < kRoughestGlossy ? glm::clamp(m.metallic, 0.0f, 1.0f) : 0.0f;
   return point;
 }
 

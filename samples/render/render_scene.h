@@ -20,6 +20,9 @@ class InstancedScene;
 
 namespace lsp::sample {
 
+// Surfaces at least as rough have no glossy ray: their lobe is diffuse to the eye, a metal's, too.
+inline constexpr float kRoughestGlossy = 0.7f;
+
 // A point of the scene seen along a ray.
 struct SurfacePoint {
   glm::vec3 position;
@@ -29,7 +32,7 @@ struct SurfacePoint {
   glm::vec3 base_color;
   glm::vec3 emission;
   float roughness = 1.0f;
-  float metallic = 0.0f;
+  float metallic = 0.0f;  // 0 for a metal that is seen as diffuse
 };
 
 // A point on a light-emitting triangle, chosen in proportion to area times luminance.

@@ -35,9 +35,6 @@ enum Component : uint32_t {
   kComponents,
 };
 
-// Surfaces rougher than this that are no metal have no glossy ray: their lobe is diffuse to the eye.
-constexpr float kRoughestGlossy = 0.7f;
-
 // Pairs of random numbers a sample draws, by purpose. Bounce b adds b times kDimensionsPerBounce.
 enum Dimension : uint32_t {
   kPixelPoint,
@@ -346,8 +343,8 @@ class Renderer {
     }
     const size_t diffuse = paths_.size();
     for (const Surface& s : surfaces_) {
-      const bool shiny = s.point.roughness < kRoughestGlossy || s.point.metallic > 0.5f;
-      if (wants(Effect::kGlossy) && shiny) paths_.push_back({s.item, true, glm::vec3(0.0f)});
+      if (wants(Effect::kGlossy) && s.point.roughness < kRoughestGlossy)
+        paths_.push_back({s.item, true, glm::vec3(0.0f)});
     }
     // Where an item's surface is.
     surface_of_item_.assign(count_, 0);

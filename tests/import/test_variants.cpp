@@ -297,4 +297,145 @@ TEST_F(Variants, GltfExtensionsThatNoListDeclaresAreNoted) {
   EXPECT_TRUE(has_note(odd, "the alphaMode GLASS is not known, OPAQUE is taken for it"));
 }
 
+// A decimal comma, or Fortran's exponent, loses vertices; the reason is named where nothing or little is
+// left.
+TEST_F(Variants, WordsThatAreNoNumbersAreNamed) {
+  const std::string facet =
+      "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1,5 0 0\nvertex 0 1 "
+      "0\nendloop\nendfacet\n";
+  const std::pair<const char*, std::string> files[] = {
+      {"a.obj", "v 0 0 0\nv 1,5 0 0\nv 0 1 0\nf 1 2 3\n"},
+      {"a.off", "OFF\n3 1 0\n0 0 0\n1,5 0 0\n0 1 0\n3 0 1 2\n"},
+      {"a.ply",
+       [] {
+         std::string text = ply("", "");
+         return text.replace(text.find("1 0 0"), 5, "1,5 0 0");
+       }()},
+      {"a.stl", facet + "endsolid\n"}};
+  for (const auto& [name, bytes] : files) {
+    const Refusal refused = refusal(name, bytes);
+    EXPECT_EQ(refused.exit, Exit::kInvalid);
+    EXPECT_NE(refused.message.find("1,5 and the like stand where numbers belong"), std::string::npos) << name;
+  }
+  const std::string corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.5 # half\n";
+  EXPECT_TRUE(import("a.obj", corners + "v nan nan nan\nv -1.#IND 0 -nan(ind)\nf 1 2 3\n").notes.empty());
+  EXPECT_TRUE(has_note(import("a.obj", corners + "v 1.0D+00 0 0\nf 1 2 3\n"), "1.0D+00 and the like"));
+}
+
+TEST_F(Variants, CloudsOfPointsAreRefusedAsSuch) {
+  for (const auto& [name, bytes] :
+       {std::pair{"a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n"}, {"a.off", "OFF\n3 0 0\n0 0 0\n1 0 0\n0 1 0\n"}}) {
+    const Refusal refused = refusal(name, bytes);
+    EXPECT_EQ(refused.exit, Exit::kInvalid);
+    EXPECT_NE(refused.message.find("3 vertices have no faces, they are a cloud of points"),
+              std::string::npos);
+  }
+}
+
+TEST_F(Variants, APointerOfGitLfsIsRefusedAsOne) {
+  const std::string pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:ab\nsize 12345\n";
+  for (const char* name : {"a.obj", "a.glb", "a.ply", "a.stl", "a.off"}) {
+    const Refusal refused = refusal(name, pointer);
+    EXPECT_EQ(refused.exit, Exit::kInvalid);
+    EXPECT_NE(refused.message.find("run git lfs pull"), std::string::npos) << name;
+  }
+}
+
+TEST_F(Variants, StlNormalsOfZeroAskForTheTrianglesOwn) {
+  std::string bytes(80, ' ');
+  append(bytes, uint32_t{1});
+  for (const float x : {0.f, 0.f, 0.f, 0.f, 0.f, 0.f, 0.f, 1.f, 0.f, 1.f, 0.f, 0.f}) append(bytes, x);
+  bytes += std::string(2, '\0');
+  const std::string text =
+      "solid a\nfacet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 0 1 0\nvertex 1 0 "
+      "0\nendloop\nendfacet\n";
+  for (const std::string& stl : {bytes, text}) {
+    const Mesh mesh = import("a.stl", stl);
+    EXPECT_EQ(mesh.normals[0][2], glm::vec3(0, 0, -1));
+    EXPECT_TRUE(mesh.notes.empty());
+  }
+}
+
+TEST_F(Variants, StlWithItsBytesInTheOtherOrder) {
+  std::string bytes(80, ' ');
+  append(bytes, __builtin_bswap32(2));
+  const Refusal refused = refusal("a.stl", bytes + std::string(100, '\x3F'));
+  EXPECT_EQ(refused.exit, Exit::kInvalid);
+  EXPECT_NE(refused.message.find("bytes in the wrong order"), std::string::npos);
+}
+
+// Old programs end lines in CR; then an LF behind the header is data.
+TEST_F(Variants, PlyBodiesThatBeginWithALineFeed) {
+  std::string bytes = ply("", "");
+  bytes.resize(bytes.find("end_header") + 11);
+  bytes.replace(bytes.find("ascii"), 5, "binary_little_endian");
+  for (char& c : bytes) c = c == '\n' ? '\r' : c;
+  append(bytes, 0x3F80000Au);  // a float of 1 and its lowest byte an LF
+  for (const float x : {0.f, 0.f, 2.f, 0.f, 0.f, 1.f, 1.f, 0.f}) append(bytes, x);
+  bytes += '\3';
+  for (const int i : {0, 1, 2}) append(bytes, i);
+  const Mesh mesh = import("a.ply", bytes);
+  ASSERT_EQ(mesh.triangles.size(), 1u);
+  EXPECT_NEAR(corner(mesh, 0, 0).x, 1.0f, 1e-5f);
+  EXPECT_TRUE(mesh.notes.empty());
+}
+
+TEST_F(Variants, PlyTypesThatItDoesNotKnowAreNamed) {
+  EXPECT_NE(refusal("a.ply", ply("property int64 id\n", "7")).message.find("of type int64"),
+            std::string::npos);
+}
+
+TEST_F(Variants, MapOptionsThatChangeNothingAreNoNotes) {
+  write("red.png", rgba_png(1, 1, {255, 0, 0, 255}));
+  const std::string obj = "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n";
+  write("a.mtl", "newmtl m\nmap_Kd -s 1 1 1 -o 0 0 0 -t 0 0 0 -mm 0 1 -bm 1 -boost 0 -texres 512 red.png\n");
+  const Mesh mesh = import("a.obj", obj);
+  EXPECT_EQ(mesh.color(0).base_color, glm::vec3(1, 0, 0));
+  EXPECT_TRUE(mesh.notes.empty());
+  write("a.mtl", "newmtl m\nmap_Kd -mm 0.2 1 red.png\n");
+  EXPECT_TRUE(has_note(import("a.obj", obj), "the option -mm of a map is not read"));
+}
+
+TEST_F(Variants, MtlColoursBeyondTheirRangeAreCutWithANote) {
+  write("a.mtl", "newmtl m\nKd 255 128 0\n");
+  const Mesh mesh = import("a.obj", "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  EXPECT_EQ(mesh.color(0).base_color, glm::vec3(1, 1, 0));
+  EXPECT_TRUE(has_note(mesh, "cut to what their range permits"));
+}
+
+// Exporters write the colour of a socket that a texture feeds, which is black.
+TEST_F(Variants, MtlFactorsOfZeroBesideAMapAreOne) {
+  write("red.png", rgba_png(1, 1, {255, 0, 0, 255}));
+  write("a.mtl", "newmtl m\nKd 0 0 0\nmap_Kd red.png\nKe 0 0 0\nmap_Ke red.png\n");
+  const Mesh mesh =
+      import("a.obj", "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n");
+  EXPECT_EQ(mesh.color(0).base_color, glm::vec3(1, 0, 0));
+  EXPECT_EQ(mesh.color(0).emission, glm::vec3(1, 0, 0));
+  EXPECT_EQ(mesh.notes.size(), 2u);
+  EXPECT_TRUE(has_note(mesh, "Ke of 0 beside its map is taken as 1"));
+}
+
+TEST_F(Variants, ColoursALittleAboveOneAreNotBytes) {
+  const Mesh mesh = import("a.ply", ply(rgb("float"), "1.2 0.50196 0"));
+  expect_color(mesh, {1, kGrey128, 0});
+  EXPECT_TRUE(has_note(mesh, "colours above 1 are cut to it"));
+  EXPECT_TRUE(import("a.ply", ply(rgb("float"), "3 2 0")).notes.empty()) << "dark, of 255";
+}
+
+TEST_F(Variants, TextureCoordinatesThatAreNotFinite) {
+  write("red.png", rgba_png(2, 1, {255, 0, 0, 255, 0, 0, 255, 255}));
+  write("a.mtl", "newmtl m\nmap_Kd red.png\n");
+  const Mesh mesh =
+      import("a.obj", "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt nan nan\nf 1/1 2/1 3/1\n");
+  EXPECT_EQ(mesh.notes.size(), 1u);
+  EXPECT_TRUE(has_note(mesh, "or no finite ones, its corner texel holds"));
+}
+
+TEST_F(Variants, OffTexturesBehindAColourAreNoAlpha) {
+  const Mesh mesh = import("a.off", off("STCOFF", "255 0 0 0.5 0.5"));
+  expect_color(mesh, {1, 0, 0});
+  EXPECT_EQ(mesh.notes.size(), 1u);
+  EXPECT_TRUE(has_note(mesh, "texture coordinates"));
+}
+
 }  // namespace

@@ -12,6 +12,7 @@
 
 #include "compare.h"
 #include "lsp/vulkan_device.hpp"
+#include "scene.h"
 
 namespace lsp::sample {
 namespace {
@@ -96,6 +97,20 @@ TEST_F(Programs, OpenPlaneIsNearlyUnoccluded) {
   double sum = 0;
   for (const glm::vec3& p : ao.pixels) sum += static_cast<double>(p.x);
   EXPECT_GT(sum / static_cast<double>(ao.pixels.size()), 0.97);
+}
+
+// So is what glTF has where a file gives no material: white, of metallic and roughness 1.
+TEST_F(Programs, ARoughMetalIsSeenAsDiffuse) {
+  for (const std::string metal : {"0", "1"}) {
+    Scene scene = make_scene("plane", detail_for("plane", 1000));
+    scene.materials[0].roughness = 1.0f;
+    scene.materials[0].metallic = std::stof(metal);
+    std::ofstream(file("metal" + metal + ".glb"), std::ios::binary) << to_glb(scene);
+    ASSERT_EQ(run("lsp-bake " + file("metal" + metal) + ".glb -o " + file("metal" + metal) + ".lsp --quiet"),
+              0);
+    render("metal" + metal, "metal" + metal, "");
+  }
+  EXPECT_EQ(read(file("metal0.pfm")), read(file("metal1.pfm")));
 }
 
 TEST_F(Programs, ApproximateIsCloseAndPrimaryRaysAreExact) {

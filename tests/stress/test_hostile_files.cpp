@@ -220,6 +220,16 @@ const std::vector<Hostile>& files() {
        ".off",
        [] { return std::string("OFF\n4294967295 4294967295 0\n0 0 0\n"); },
        {kInvalid, kLimit}},
+      {"binary_off_of_four_billion_vertices",
+       ".off",
+       [] { return "OFF BINARY\n" + std::string(12, '\xFF') + std::string(1000, '\0'); },
+       {kInvalid}},
+      {"binary_off_of_ten_million_empty_faces",
+       ".off",
+       [] {
+         return std::string("OFF BINARY\n\0\0\0\0\0\x98\x96\x80\0\0\0\0", 23) + std::string(80'000'000, '\0');
+       },
+       {kInvalid, kLimit}},
       {"off_face_of_four_billion_corners",
        ".off",
        [] { return std::string("OFF\n1 1 0\n0 0 0\n4294967295 0 0 0\n"); },

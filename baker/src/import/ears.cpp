@@ -8,31 +8,6 @@ namespace {
 
 constexpr uint32_t kNone = 0xFFFFFFFFu;
 
-// Twice the signed area of a triangle. Its sign is right for these coordinates but for what their differences
-// round.
-double area2(const glm::dvec2& a, const glm::dvec2& b, const glm::dvec2& c) {
-  const double bx = b.x - a.x, by = b.y - a.y, cx = c.x - a.x, cy = c.y - a.y;
-  const double left = bx * cy, right = by * cx, area = left - right;
-  constexpr double kRounding = 4e-16;
-  if (std::abs(area) > kRounding * (std::abs(left) + std::abs(right))) return area;
-  return area + (std::fma(bx, cy, -left) - std::fma(by, cx, -right));
-}
-
-// The part of a triangle between two heights, along x.
-std::pair<double, double> span_between(const glm::dvec2 (&corners)[3], double low, double high) {
-  std::pair<double, double> span{INFINITY, -INFINITY};
-  for (int i = 0; i < 3; ++i) {
-    glm::dvec2 a = corners[i], b = corners[(i + 1) % 3];
-    if (a.y > b.y) std::swap(a, b);
-    if (b.y < low || a.y > high) continue;
-    const auto x_at = [&](double y) { return a.x + (b.x - a.x) * ((y - a.y) / (b.y - a.y)); };
-    const double x0 = a.y < low ? x_at(low) : a.x, x1 = b.y > high ? x_at(high) : b.x;
-    span.first = std::min(span.first, std::min(x0, x1));
-    span.second = std::max(span.second, std::max(x0, x1));
-  }
-  return span;
-}
-
 }  // namespace
 
 EarCut EarClipper::cut(std::span<const glm::dvec2> corners, std::vector<glm::uvec3>& out, uint64_t& work) {
@@ -45,7 +20,7 @@ EarCut EarClipper::cut(std::span<const glm::dvec2> corners, std::vector<glm::uve
   while (left_ > 3 && work > 0) {
     const uint32_t v = head_ < queue_.size() ? queue_[head_++] : kNone;
     if (v == kNone) {  // no ear is left: it crosses itself, or what is left is a line
-      const uint32_t worst = least_bad();
+      const uint32_t worst = least_bad(any);
       any = next_[worst];
       clip(worst);
       continue;
@@ -92,41 +67,14 @@ void EarClipper::start() {
   alive_.assign(n, 1);
   queued_.assign(n, 1);
   touching_.assign(n, 0);
-  obstacle_.resize(n);
-  for (uint32_t v = 0; v < n; ++v) obstacle_[v] = !is_convex(v);
+  obstacles_.build(at_);
+  for (uint32_t v = 0; v < n; ++v) obstacles_.set(v, !is_convex(v));
   first_waiting_.assign(n, kNone);
   waits_for_.assign(n, kNone);
   waiting_.clear();
   queue_.resize(n);
   for (uint32_t v = 0; v < n; ++v) queue_[v] = v;
   head_ = 0;
-  late_.clear();
-  build_grid();
-}
-
-void EarClipper::build_grid() {
-  const auto count = size_t(std::count(obstacle_.begin(), obstacle_.end(), 1));
-  side_ = std::clamp<size_t>(size_t(std::sqrt(double(count))), 1, 1024);
-  low_ = at_[0];
-  glm::dvec2 high = at_[0];
-  for (const glm::dvec2& p : at_) low_ = glm::min(low_, p), high = glm::max(high, p);
-  for (int k = 0; k < 2; ++k) per_unit_[k] = high[k] > low_[k] ? double(side_) / (high[k] - low_[k]) : 0;
-  cell_begins_.assign(side_ * side_ + 1, 0);
-  const auto cell = [&](uint32_t v) { return cell_of(at_[v].y, 1) * side_ + cell_of(at_[v].x, 0); };
-  for (uint32_t v = 0; v < at_.size(); ++v) {
-    if (obstacle_[v]) ++cell_begins_[cell(v) + 1];
-  }
-  for (size_t i = 1; i < cell_begins_.size(); ++i) cell_begins_[i] += cell_begins_[i - 1];
-  in_cells_.resize(count);
-  std::vector<uint32_t> place(cell_begins_.begin(), cell_begins_.end() - 1);
-  for (uint32_t v = 0; v < at_.size(); ++v) {
-    if (obstacle_[v]) in_cells_[place[cell(v)]++] = v;
-  }
-}
-
-size_t EarClipper::cell_of(double value, int axis) const {
-  const double cell = (value - low_[axis]) * per_unit_[axis];
-  return size_t(std::clamp(cell, 0.0, double(side_) - 1));
 }
 
 bool EarClipper::is_convex(uint32_t v) const { return area2(at_[prev_[v]], at_[v], at_[next_[v]]) > 0; }
@@ -163,34 +111,9 @@ bool EarClipper::blocks(uint32_t ear, uint32_t p, bool& touching) const {
 
 uint32_t EarClipper::find_blocker(uint32_t ear, bool& touching) {
   const uint32_t before = prev_[ear], after = next_[ear];
-  const auto in_the_way = [&](uint32_t p) {
-    *work_ -= *work_ > 0;
-    return alive_[p] && obstacle_[p] && p != before && p != after && blocks(ear, p, touching);
-  };
   const glm::dvec2 corners[3] = {at_[before], at_[ear], at_[after]};
-  const double bottom = std::min(corners[0].y, std::min(corners[1].y, corners[2].y));
-  const double top = std::max(corners[0].y, std::max(corners[1].y, corners[2].y));
-  // A margin for what the arithmetic of cells rounds, in cells.
-  constexpr double kMargin = 1e-6;
-  const double margin_x = per_unit_.x > 0 ? kMargin / per_unit_.x : 0;
-  const double margin_y = per_unit_.y > 0 ? kMargin / per_unit_.y : 0;
-  const size_t last_row = cell_of(top + margin_y, 1);
-  for (size_t row = cell_of(bottom - margin_y, 1); row <= last_row; ++row) {
-    const double height = per_unit_.y > 0 ? 1 / per_unit_.y : 0;
-    const double low = low_.y + double(row) * height;
-    const auto [left, right] = span_between(corners, low - margin_y, low + height + margin_y);
-    if (left > right) continue;
-    const size_t begin = cell_begins_[row * side_ + cell_of(left - margin_x, 0)];
-    const size_t end = cell_begins_[row * side_ + cell_of(right + margin_x, 0) + 1];
-    *work_ -= *work_ > 0;
-    for (size_t i = begin; i < end; ++i) {
-      if (in_the_way(in_cells_[i])) return in_cells_[i];
-    }
-  }
-  for (const uint32_t p : late_) {
-    if (in_the_way(p)) return p;
-  }
-  return kNone;
+  return obstacles_.find(corners, kNone, *work_,
+                         [&](uint32_t p) { return p != before && p != after && blocks(ear, p, touching); });
 }
 
 void EarClipper::clip(uint32_t v) {
@@ -199,6 +122,7 @@ void EarClipper::clip(uint32_t v) {
   next_[before] = after;
   prev_[after] = before;
   alive_[v] = 0;
+  obstacles_.set(v, false);
   --left_;
   release(v, false);
   neighbour_changed(before);
@@ -207,8 +131,7 @@ void EarClipper::clip(uint32_t v) {
 
 void EarClipper::neighbour_changed(uint32_t v) {
   const bool obstacle = !is_convex(v);
-  if (obstacle && !obstacle_[v]) late_.push_back(v);
-  obstacle_[v] = obstacle;
+  obstacles_.set(v, obstacle);
   release(v, obstacle);
   enqueue(v);
 }
@@ -237,17 +160,18 @@ void EarClipper::enqueue(uint32_t v) {
   queue_.push_back(v);
 }
 
-// What to cut where there is no ear: a corner without area, else the convex one of least area.
-uint32_t EarClipper::least_bad() {
-  uint32_t v = 0;
-  while (!alive_[v]) ++v;
-  uint32_t best = v;
+// What to cut where there is no ear: a corner without area, else the convex one of least area among the next.
+uint32_t EarClipper::least_bad(uint32_t from) {
+  constexpr size_t kMostLooked = 256;
+  while (!alive_[from]) from = next_[from];
+  uint32_t best = from;
   double least = INFINITY;
-  for (size_t i = 0; i < left_; ++i, v = next_[v]) {
+  size_t looked = 0;
+  for (uint32_t v = from; looked < std::min(left_, kMostLooked) && least > 0; ++looked, v = next_[v]) {
     const double area = area2(at_[prev_[v]], at_[v], at_[next_[v]]);
     if (area >= 0 && area < least) best = v, least = area;
   }
-  *work_ -= std::min<uint64_t>(*work_, at_.size());
+  *work_ -= std::min<uint64_t>(*work_, looked);
   return best;
 }
 

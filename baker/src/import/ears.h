@@ -6,6 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "import/corner_tree.h"
+
 namespace lsp {
 
 enum class EarCut {
@@ -16,17 +18,15 @@ enum class EarCut {
 
 // Ear clipping (Meisters 1975) for outlines that may touch themselves: bridges to holes, repeated corners,
 // corners on edges. A corner that is found not to be an ear waits for the corner that is in its way, so that
-// none is tried in vain; those that may be in the way lie in a grid. Some n log n for what people draw.
+// none is tried in vain; those that may be in the way lie in a tree. Some n log n for what people draw.
 class EarClipper {
  public:
   // Appends corners.size() - 2 triangles of corner numbers to `out`. The outline is counter-clockwise. `work`
-  // is what is left of the number of point tests allowed.
+  // is what is left of the number of steps allowed: nodes and corners of the tree that are looked at.
   EarCut cut(std::span<const glm::dvec2> corners, std::vector<glm::uvec3>& out, uint64_t& work);
 
  private:
   void start();
-  void build_grid();
-  size_t cell_of(double value, int axis) const;
   bool is_convex(uint32_t v) const;
   bool is_spike(uint32_t v) const;
   bool goes_into(uint32_t p, const glm::dvec2& from, const glm::dvec2& right, const glm::dvec2& left) const;
@@ -35,7 +35,7 @@ class EarClipper {
   void clip(uint32_t v);
   void neighbour_changed(uint32_t v);
   void release(uint32_t blocker, bool touching_only);
-  uint32_t least_bad();
+  uint32_t least_bad(uint32_t from);
   void enqueue(uint32_t v);
 
   std::span<const glm::dvec2> at_;
@@ -43,7 +43,7 @@ class EarClipper {
   uint64_t* work_ = nullptr;
   size_t left_ = 0;  // corners of the outline that are left
   std::vector<uint32_t> next_, prev_;
-  std::vector<uint8_t> alive_, obstacle_, queued_, touching_;
+  std::vector<uint8_t> alive_, queued_, touching_;
   std::vector<uint32_t> queue_;
   size_t head_ = 0;
   // Who waits for a corner: lists of entries in `waiting_`. An entry counts while waits_for_ says so too.
@@ -52,10 +52,7 @@ class EarClipper {
   };
   std::vector<Waiting> waiting_;
   std::vector<uint32_t> first_waiting_, waits_for_;
-  // Obstacles, the corners that are not convex: by cell, and those that became one later.
-  std::vector<uint32_t> cell_begins_, in_cells_, late_;
-  glm::dvec2 low_{0}, per_unit_{0};
-  size_t side_ = 0;
+  CornerTree obstacles_;  // the corners that are not convex
 };
 
 }  // namespace lsp

@@ -100,6 +100,7 @@ class GltfReader {
     std::vector<uint8_t> state(model_.nodes.size(), kNew);
     extents_.assign(model_.nodes.size(), {});
     Extent all;
+    size_t hidden = 0;
     std::vector<std::pair<int, size_t>> stack;
     for (const int root : roots) {
       node_at(root);
@@ -122,10 +123,15 @@ class GltfReader {
         extent.visits = 1 + children.size();
         extent.triangles = own_triangles(node);
         for (const int child : children) add(extent, extents_[size_t(child)]);
+        if (is_hidden(node)) hidden += extent.triangles > 0, extent = {};
         state[size_t(node)] = kDone;
         stack.pop_back();
       }
       add(all, extents_[size_t(root)]);
+    }
+    if (hidden) {
+      builder_.note(document_->file + ": " + std::to_string(hidden) +
+                    " nodes are not visible, they and what hangs below are left out");
     }
     size_t left_out = 0;
     for (size_t node = 0; node < state.size(); ++node)
@@ -138,6 +144,15 @@ class GltfReader {
       throw Failure(Exit::kLimit, document_->file, "places more than 2^24 nodes, split the scene");
     }
     if (!instances_) builder_.check_count(document_->file, all.triangles);
+  }
+
+  // KHR_node_visibility.
+  bool is_hidden(int node) const {
+    const auto& extensions = model_.nodes[size_t(node)].extensions;
+    const auto found = extensions.find("KHR_node_visibility");
+    if (found == extensions.end() || !found->second.IsObject()) return false;
+    const tinygltf::Value& visible = found->second.Get("visible");
+    return visible.IsBool() && !visible.Get<bool>();
   }
 
   static void add(Extent& to, const Extent& more) {
@@ -163,11 +178,17 @@ class GltfReader {
   uint64_t instances(int node) {
     const tinygltf::Value* attributes = instancing(node);
     if (!attributes) return 1;
-    uint64_t count = std::numeric_limits<uint64_t>::max();
+    uint64_t count = std::numeric_limits<uint64_t>::max(), most = 0;
     for (const char* name : {"TRANSLATION", "ROTATION", "SCALE"}) {
       const tinygltf::Value& accessor = attributes->Get(name);
-      if (accessor.IsInt()) count = std::min<uint64_t>(count, accessors_.at(accessor.Get<int>()).count);
+      if (!accessor.IsInt()) continue;
+      const uint64_t own = accessors_.at(accessor.Get<int>()).count;
+      count = std::min(count, own);
+      most = std::max(most, own);
     }
+    if (count < most)
+      builder_.note(document_->file +
+                    ": instances have attributes of different lengths, the shortest counts");
     return count == std::numeric_limits<uint64_t>::max() ? 1 : count;
   }
 
@@ -265,7 +286,8 @@ class GltfReader {
     std::map<uint32_t, uint32_t> materials;  // from the builder's to those of the asset
     for (const GltfPrimitive& primitive : primitives(node)) {
       const auto [at, fresh] = materials.try_emplace(primitive.material, 0);
-      if (fresh) at->second = asset.add_material(builder_.mesh().materials[primitive.material]);
+      if (fresh)
+        at->second = asset.add_material(document_->file, builder_.mesh().materials[primitive.material]);
       place(primitive, matrix, model_.nodes[size_t(node)].skin, asset, at->second);
     }
     return add_asset(*instances_, asset, mesh_name(node), true);

@@ -130,6 +130,11 @@ void check_version(const std::string& file, const json& document) {
   if (text.substr(0, 2) != "2.") {
     throw Failure(Exit::kUnsupported, file, "is glTF of version " + printable(text) + ", give version 2");
   }
+  const std::string least = text_member(member(document, "asset"), "minVersion");
+  if (!least.empty() && least != "2.0") {
+    throw Failure(Exit::kUnsupported, file,
+                  "asks for a reader of glTF " + printable(least) + ", give version 2.0");
+  }
 }
 
 // The file by that URI, which from now on is one of the document's sources.

@@ -34,18 +34,30 @@ int64_t image_of(const json& texture) {
 
 }  // namespace
 
+// The default material's members are those of an empty one.
 const GltfMaterials::Entry& GltfMaterials::at(uint32_t index) {
   const json& source = element(member(document_.looks, "materials"), index);
-  const auto [at, fresh] = materials_.try_emplace(source.is_null() ? kNoIndex : index);
+  const uint32_t key = source.is_null() ? kNoIndex : index;
+  if (key != index) note("primitives name materials that are not there, glTF's default holds for them");
+  const auto [at, fresh] = materials_.try_emplace(key);
   if (!fresh) return at->second;
-  if (source.is_null()) {
-    at->second.id = builder_.default_material();
-  } else {
-    const auto known = ids_.find(index);
-    at->second = read(source, known == ids_.end() ? kNoIndex : known->second);
-    ids_[index] = at->second.id;
-  }
+  const auto known = ids_.find(key);
+  at->second = read(source, known == ids_.end() ? kNoIndex : known->second);
+  ids_[key] = at->second.id;
   return at->second;
+}
+
+double GltfMaterials::number(const json& parent, const char* key, double fallback) {
+  const json& value = member(parent, key);
+  if (!value.is_null() && !value.is_number())
+    note(std::string(key) + " of a material is no number and not read");
+  return number_member(parent, key, fallback);
+}
+
+template <typename T>
+void GltfMaterials::numbers(const json& parent, const char* key, size_t count, T* values) {
+  if (!numbers_member(parent, key, count, values))
+    note(std::string(key) + " of a material is not " + std::to_string(count) + " numbers and not read");
 }
 
 GltfMaterials::Entry GltfMaterials::read(const json& source, uint32_t known_id) {
@@ -54,22 +66,22 @@ GltfMaterials::Entry GltfMaterials::read(const json& source, uint32_t known_id) 
   float factor[4] = {1, 1, 1, 1};
   const json& pbr = member(source, "pbrMetallicRoughness");
   const json* base = &member(pbr, "baseColorTexture");
-  numbers_member(pbr, "baseColorFactor", 4, factor);
-  material.roughness = float(number_member(pbr, "roughnessFactor", 1));
-  material.metallic = float(number_member(pbr, "metallicFactor", 1));
-  numbers_member(source, "emissiveFactor", 3, &material.emission[0]);
+  numbers(pbr, "baseColorFactor", 4, factor);
+  material.roughness = float(number(pbr, "roughnessFactor", 1));
+  material.metallic = float(number(pbr, "metallicFactor", 1));
+  numbers(source, "emissiveFactor", 3, &material.emission[0]);
 
   const json& extensions = member(source, "extensions");
   material.emission *=
-      float(number_member(member(extensions, "KHR_materials_emissive_strength"), "emissiveStrength", 1));
+      float(number(member(extensions, "KHR_materials_emissive_strength"), "emissiveStrength", 1));
   if (const json& glossy = member(extensions, "KHR_materials_pbrSpecularGlossiness"); glossy.is_object()) {
     std::fill(std::begin(factor), std::end(factor), 1.0f);
-    numbers_member(glossy, "diffuseFactor", 4, factor);
+    numbers(glossy, "diffuseFactor", 4, factor);
     base = &member(glossy, "diffuseTexture");
-    material.roughness = 1.0f - float(number_member(glossy, "glossinessFactor", 1));
+    material.roughness = 1.0f - float(number(glossy, "glossinessFactor", 1));
     material.metallic = 0;
     float specular[3] = {1, 1, 1};
-    numbers_member(glossy, "specularFactor", 3, specular);
+    numbers(glossy, "specularFactor", 3, specular);
     if (std::any_of(std::begin(specular), std::end(specular), [](float x) { return x != 0; }))
       note(
           "specular factors of KHR_materials_pbrSpecularGlossiness are not read, its materials are no "
@@ -92,11 +104,11 @@ GltfMaterials::Entry GltfMaterials::read(const json& source, uint32_t known_id) 
   if (alpha.mode == AlphaMode::kOpaque && !mode.empty() && mode != "OPAQUE")
     note("the alphaMode " + mode + " is not known, OPAQUE is taken for it");
   alpha.factor = factor[3];
-  alpha.cutoff = float(number_member(source, "alphaCutoff", 0.5));
+  alpha.cutoff = float(number(source, "alphaCutoff", 0.5));
   material.base_color = {factor[0], factor[1], factor[2]};
   material.opacity = alpha.coverage(1);
   Entry entry;
-  entry.id = known_id != kNoIndex ? known_id : builder_.add_material(material);
+  entry.id = known_id != kNoIndex ? known_id : builder_.add_material(document_.file, material);
   const Material& bounded = builder_.mesh().materials[entry.id];
   entry.surface = {bounded.base_color, bounded.emission, alpha, texture(*base, alpha), {}};
   if (bounded.emission != glm::vec3(0)) entry.surface.glow = texture(member(source, "emissiveTexture"), {});
@@ -159,9 +171,9 @@ TextureUse GltfMaterials::texture(const json& info, const AlphaRule& rule) {
   use.set = int(std::min<int64_t>(index_member(info, "texCoord", 0), 1 << 20));
   if (const json& placed = member(member(info, "extensions"), "KHR_texture_transform"); placed.is_object()) {
     double scale[2] = {1, 1};
-    numbers_member(placed, "scale", 2, scale);
-    numbers_member(placed, "offset", 2, &use.offset[0]);
-    const double angle = number_member(placed, "rotation", 0), c = std::cos(angle), s = std::sin(angle);
+    numbers(placed, "scale", 2, scale);
+    numbers(placed, "offset", 2, &use.offset[0]);
+    const double angle = number(placed, "rotation", 0), c = std::cos(angle), s = std::sin(angle);
     use.linear = glm::dmat2(c * scale[0], -s * scale[0], s * scale[1], c * scale[1]);
     use.set = int(std::min<int64_t>(index_member(placed, "texCoord", use.set), 1 << 20));
   }

@@ -22,8 +22,7 @@ class GltfMaterials {
                 MeshBuilder& builder)
       : path_(path), document_(document), accessors_(accessors), builder_(builder) {}
 
-  // Made on first use; where the document has none by that number, glTF's default: the builder's id is then
-  // that of triangles without a material.
+  // Made on first use; where the document has none by that number, glTF's default (white, a rough metal).
   const Entry& at(uint32_t index);
 
   // Forgets the pictures where they have come to take much memory.
@@ -37,6 +36,10 @@ class GltfMaterials {
   Picture read_picture(int64_t image);
   std::string picture_bytes(const nlohmann::json& image);
   void mean_roughness(const nlohmann::json& info, Material& material);
+  // As their namesakes of json_member.h, with a note where something else is there.
+  double number(const nlohmann::json& parent, const char* key, double fallback);
+  template <typename T>
+  void numbers(const nlohmann::json& parent, const char* key, size_t count, T* values);
   void note_unread_textures(const nlohmann::json& source);
   void note(const std::string& text) { builder_.note(document_.file + ": " + text); }
 

@@ -94,6 +94,10 @@ const std::vector<GltfPrimitive>& GltfPrimitives::of(int mesh, const std::vector
   const auto [at, fresh] = meshes_.try_emplace({mesh, effective});
   if (!fresh) return at->second;
   for (const tinygltf::Primitive& primitive : source.primitives) {
+    const size_t targets = primitive.targets.size();
+    if (!effective.empty() && targets != effective.size())
+      builder_.note(document_.file + ": a mesh with " + std::to_string(targets) + " morph targets has " +
+                    std::to_string(effective.size()) + " weights, those left over of either are not read");
     const int mode = primitive.mode < 0 ? TINYGLTF_MODE_TRIANGLES : primitive.mode;
     if (mode < TINYGLTF_MODE_TRIANGLES || mode > TINYGLTF_MODE_TRIANGLE_FAN) {
       ++skipped_modes_;
@@ -157,6 +161,9 @@ GltfPrimitive GltfPrimitives::read(const tinygltf::Primitive& source, int mode,
       vertices.resize(out.positions.size());
       for (size_t i = 0; i < vertices.size(); ++i) vertices[i] = uint32_t(i);
     }
+    if (mode == TINYGLTF_MODE_TRIANGLES && vertices.size() % 3 != 0)
+      builder_.note(document_.file +
+                    ": a primitive's vertices are no multiple of three, those left over hold no triangle");
     builder_.budget().charge(document_.file, vertices.size(), 3 * sizeof(uint32_t));
     out.indices = expand(std::move(vertices), mode);
   }
@@ -180,7 +187,18 @@ GltfPrimitives::Values GltfPrimitives::read_values(const tinygltf::Primitive& so
              draco_id(source.extensions.at("KHR_draco_mesh_compression"), name) < 0) {
     out.floats = accessors_.floats(found->second, out.components);
   }
+  if (name == "COLOR_0") normalize_color(accessors_.at(found->second), out);
   return out;
+}
+
+// Colours in whole numbers are parts of the largest one; exporters forget to say so.
+void GltfPrimitives::normalize_color(const tinygltf::Accessor& accessor, Values& values) {
+  const bool bytes = accessor.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE;
+  if (accessor.normalized || (!bytes && accessor.componentType != TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT))
+    return;
+  for (float& value : values.floats) value /= bytes ? 255.0f : 65535.0f;
+  builder_.note(document_.file +
+                ": vertex colours in whole numbers are taken as normalized, which they do not say");
 }
 
 // Adds the targets' displacements, each by its weight (glTF 2.0, section 3.7.2.2).
@@ -216,6 +234,7 @@ void GltfPrimitives::read_colors(const tinygltf::Primitive& source, const std::v
       std::any_of(colors.floats.begin(), colors.floats.end(), [](float x) { return !(x >= 0 && x <= 1); });
   if (beyond && weights.empty())
     builder_.note(document_.file + ": vertex colours are cut to the range from 0 to 1");
+  note_missing("COLOR_0", colors, out);
   const Surface& surface = entry.surface;
   if (!surface.has_textures() && !colored) return;
   const auto coordinates = [&](const TextureUse& use) {
@@ -225,13 +244,18 @@ void GltfPrimitives::read_colors(const tinygltf::Primitive& source, const std::v
     if (values.floats.empty())
       builder_.note(document_.file + ": a primitive has a texture and no " + name +
                     ", its corner texel holds");
+    else
+      note_missing(name, values, out);
+    if (std::any_of(values.floats.begin(), values.floats.end(), [](float x) { return !std::isfinite(x); }))
+      builder_.note(document_.file + ": " + name +
+                    " is not finite at some vertices, the corner texel holds there");
     return std::move(values.floats);
   };
   const std::vector<float> base = coordinates(surface.base), glow = coordinates(surface.glow);
   const size_t count = out.indices.size() / 3;
   builder_.budget().charge(document_.file, count, sizeof(TriangleColor));
   const auto place = [](const TextureUse& use, const std::vector<float>& list, size_t i) {
-    const bool there = 2 * i + 1 < list.size();
+    const bool there = 2 * i + 1 < list.size() && std::isfinite(list[2 * i] + list[2 * i + 1]);
     return use.place(there ? glm::dvec2(list[2 * i], list[2 * i + 1]) : glm::dvec2(0));
   };
   out.colors = mean_colors(surface, count, [&](size_t t, SurfaceCorner(&corners)[3]) {
@@ -245,6 +269,14 @@ void GltfPrimitives::read_colors(const tinygltf::Primitive& source, const std::v
     }
   });
   materials_.trim();
+}
+
+// Every element needs each attribute; a file with fewer has lost them.
+void GltfPrimitives::note_missing(const std::string& name, const Values& values, const GltfPrimitive& out) {
+  const size_t count = values.components ? values.floats.size() / size_t(values.components) : 0;
+  if (count > 0 && count != out.positions.size())
+    builder_.note(document_.file + ": a primitive has fewer or more of " + name +
+                  " than positions, it is taken as it is");
 }
 
 // All sets of joints and weights, side by side for each position.

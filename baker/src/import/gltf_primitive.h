@@ -49,6 +49,8 @@ class GltfPrimitives {
   GltfPrimitive read(const tinygltf::Primitive& source, int mode, const std::vector<double>& weights);
   Values read_values(const tinygltf::Primitive& source, const std::string& name, int components);
   void read_colors(const tinygltf::Primitive& source, const std::vector<double>& weights, GltfPrimitive& out);
+  void normalize_color(const tinygltf::Accessor& accessor, Values& values);
+  void note_missing(const std::string& name, const Values& values, const GltfPrimitive& out);
   void read_joints(const tinygltf::Primitive& source, GltfPrimitive& out);
   void morph(const tinygltf::Primitive& source, const std::string& name, const std::vector<double>& weights,
              Values& values);

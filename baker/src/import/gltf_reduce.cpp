@@ -19,6 +19,7 @@ constexpr std::string_view kRead[] = {"KHR_draco_mesh_compression",
                                       "KHR_mesh_quantization",
                                       "EXT_meshopt_compression",
                                       "EXT_mesh_gpu_instancing",
+                                      "KHR_node_visibility",
                                       "KHR_materials_emissive_strength",
                                       "KHR_materials_pbrSpecularGlossiness",
                                       "KHR_materials_unlit",
@@ -102,7 +103,7 @@ json reduce_document(const json& from) {
     json out = json::object();
     copy(item, out,
          {"name", "mesh", "children", "matrix", "translation", "rotation", "scale", "skin", "weights"});
-    json extensions = reduce_extensions(item, {"EXT_mesh_gpu_instancing"});
+    json extensions = reduce_extensions(item, {"EXT_mesh_gpu_instancing", "KHR_node_visibility"});
     if (!extensions.empty()) out["extensions"] = std::move(extensions);
     return out;
   });
@@ -170,6 +171,27 @@ void collect_extensions(const json& value, std::set<std::string>& names) {
   }
 }
 
+// In words, what a node has that is not read.
+void collect_unread(const json& node, std::set<std::string>& parts) {
+  const json& instanced = member(member(member(node, "extensions"), "EXT_mesh_gpu_instancing"), "attributes");
+  if (instanced.is_object()) {
+    for (const auto& [name, accessor] : instanced.items()) {
+      if (name != "TRANSLATION" && name != "ROTATION" && name != "SCALE")
+        parts.insert("the attribute " + name + " of instances is not read");
+    }
+  }
+  const bool has_matrix = !member(node, "matrix").is_null();
+  constexpr std::pair<const char*, size_t> kSizes[] = {
+      {"matrix", 16}, {"translation", 3}, {"rotation", 4}, {"scale", 3}};
+  double values[16];
+  for (const auto& [key, size] : kSizes) {
+    if (!numbers_member(node, key, size, values))
+      parts.insert(std::string(key) + " of a node is not " + std::to_string(size) + " numbers and not read");
+    if (has_matrix && size < 16 && !member(node, key).is_null())
+      parts.insert(std::string(key) + " of a node that has a matrix is not read");
+  }
+}
+
 }  // namespace
 
 json reduce_to_geometry(const std::string& file, const json& document) {
@@ -204,21 +226,14 @@ std::vector<std::string> unread_parts(const json& document) {
       }
     }
   }
-  std::set<std::string> instanced;
-  if (const json& nodes = member(document, "nodes"); nodes.is_array()) {
-    for (const json& node : nodes) {
-      const json& list = member(member(member(node, "extensions"), "EXT_mesh_gpu_instancing"), "attributes");
-      if (!list.is_object()) continue;
-      for (const auto& [name, accessor] : list.items()) {
-        if (name != "TRANSLATION" && name != "ROTATION" && name != "SCALE") instanced.insert(name);
-      }
-    }
-  }
   std::vector<std::string> parts;
   for (const std::string& name : extensions) parts.push_back("the extension " + name + " is not read");
   for (const std::string& name : attributes) parts.push_back("the vertex attribute " + name + " is not read");
-  for (const std::string& name : instanced)
-    parts.push_back("the attribute " + name + " of instances is not read");
+  if (const json& nodes = member(document, "nodes"); nodes.is_array()) {
+    std::set<std::string> of_nodes;
+    for (const json& node : nodes) collect_unread(node, of_nodes);
+    parts.insert(parts.end(), of_nodes.begin(), of_nodes.end());
+  }
   if (member(document, "scenes").size() > 1 && !member(document, "scene").is_null()) {
     parts.push_back("only the default one of its scenes is read");
   } else if (member(document, "scenes").size() > 1) {

@@ -48,22 +48,20 @@ void check_pose(const PoseRequest& pose) {
 
 void refuse_input(const std::filesystem::path& path, uint64_t count, const Rejected& before,
                   const Rejected& after, std::span<const std::string> notes) {
-  if (count == 0) {
-    std::string noted;
-    const std::string prefix = path.string() + ": ";
-    for (const std::string& note : notes.first(std::min<size_t>(notes.size(), 3)))
-      noted +=
-          (noted.empty() ? " (noted: " : "; ") + note.substr(note.starts_with(prefix) ? prefix.size() : 0);
-    throw Failure(Exit::kInvalid, path.string(),
-                  "holds no triangle, give a file with a mesh in it" + noted + (noted.empty() ? "" : ")"));
-  }
+  std::string noted;
+  const std::string prefix = path.string() + ": ";
+  for (const std::string& note : notes.first(std::min<size_t>(notes.size(), 3)))
+    noted += (noted.empty() ? " (noted: " : "; ") + note.substr(note.starts_with(prefix) ? prefix.size() : 0);
+  if (!noted.empty()) noted += ")";
+  if (count == 0)
+    throw Failure(Exit::kInvalid, path.string(), "holds no triangle, give a file with a mesh in it" + noted);
   const std::string why = "none of its " + std::to_string(count) + " triangles can be used (" +
                           std::to_string(after.degenerate - before.degenerate) + " degenerate, " +
                           std::to_string(after.non_finite - before.non_finite) + " not finite, " +
                           std::to_string(after.out_of_range - before.out_of_range) +
                           " with indices out of range, " +
                           std::to_string(after.invisible - before.invisible) + " wholly transparent)";
-  throw Failure(Exit::kInvalid, path.string(), why + ", repair or leave out the file");
+  throw Failure(Exit::kInvalid, path.string(), why + ", repair or leave out the file" + noted);
 }
 
 Mesh import_meshes(std::span<const std::filesystem::path> inputs, const ImportOptions& options) {

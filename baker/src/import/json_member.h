@@ -33,14 +33,18 @@ inline std::string text_member(const nlohmann::json& parent, const char* key) {
   return value.is_string() ? value.get<std::string>() : std::string();
 }
 
-// Overwrites the first `count` of `values` by an array's numbers; an array of another length changes nothing.
+// Overwrites `values` by an array's `count` numbers. False, with nothing changed, where there is something
+// else.
 template <typename T>
-void numbers_member(const nlohmann::json& parent, const char* key, size_t count, T* values) {
+bool numbers_member(const nlohmann::json& parent, const char* key, size_t count, T* values) {
   const nlohmann::json& array = member(parent, key);
-  if (!array.is_array() || array.size() != count) return;
-  for (size_t i = 0; i < count; ++i) {
-    if (array[i].is_number()) values[i] = T(array[i].template get<double>());
+  if (array.is_null()) return true;
+  if (!array.is_array() || array.size() != count) return false;
+  for (const nlohmann::json& item : array) {
+    if (!item.is_number()) return false;
   }
+  for (size_t i = 0; i < count; ++i) values[i] = T(array[i].template get<double>());
+  return true;
 }
 
 }  // namespace lsp

@@ -263,10 +263,13 @@ void MeshBuilder::smooth_missing() {
   budget_.release(temporary);
 }
 
-uint32_t MeshBuilder::add_material(Material material) {
+uint32_t MeshBuilder::add_material(const std::string& file, Material material) {
   material.name = printable(material.name);
-  const auto bounded = [](float value, float fallback, float high) {
-    return std::isfinite(value) ? std::min(std::max(value, 0.0f), high) : fallback;
+  bool cut = false;
+  const auto bounded = [&](float value, float fallback, float high) {
+    const float bound = std::isfinite(value) ? std::min(std::max(value, 0.0f), high) : fallback;
+    cut = cut || !(bound == value);
+    return bound;
   };
   constexpr float kLargest = std::numeric_limits<float>::max();
   for (int i = 0; i < 3; ++i) {
@@ -276,13 +279,14 @@ uint32_t MeshBuilder::add_material(Material material) {
   material.opacity = bounded(material.opacity, 1.0f, 1.0f);
   material.roughness = bounded(material.roughness, 1.0f, 1.0f);
   material.metallic = bounded(material.metallic, 0.0f, 1.0f);
-  budget_.charge(file_, sizeof(Material) * 2 + material.name.size());
+  if (cut) note(file + ": colours and factors of materials are cut to what their range permits");
+  budget_.charge(file, sizeof(Material) * 2 + material.name.size());
   mesh_.materials.push_back(std::move(material));
   return uint32_t(mesh_.materials.size() - 1);
 }
 
 uint32_t MeshBuilder::default_material() {
-  if (default_material_ == kNoIndex) default_material_ = add_material({});
+  if (default_material_ == kNoIndex) default_material_ = add_material(file_, {});
   return default_material_;
 }
 

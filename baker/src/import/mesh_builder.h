@@ -45,7 +45,8 @@ class MeshBuilder {
   // Ends the group; corners still without a normal get one.
   void end();
 
-  uint32_t add_material(Material material);
+  // What is beyond a value's range is cut, with a note that begins with `file`.
+  uint32_t add_material(const std::string& file, Material material);
   // The material of triangles to which no file gives one; made on first use.
   uint32_t default_material();
   bool is_default(uint32_t material) const { return material == default_material_; }

@@ -34,17 +34,23 @@ bool read_factor(std::string_view line, float& factor, std::set<std::string>& no
   return std::isfinite(value);
 }
 
+// Whether numbers of an option that is not read are those that change nothing.
+bool says_nothing(std::string_view option, const glm::dvec2& values) {
+  if (option == "-mm") return values == glm::dvec2(0, 1);
+  return option == "-texres" || values == (option == "-bm" ? glm::dvec2(1, 0) : glm::dvec2(0));
+}
+
 // "-option values... file name", which may hold spaces. Numbers end an option's values: -o, -s and -t take
 // one to three of them.
 MtlMap read_map(std::string_view line, std::set<std::string>& notes) {
   MtlMap map;
-  const auto take_numbers = [&](int most, glm::dvec2* to) {
+  const auto take_numbers = [&](int most, glm::dvec2& to) {
     for (int i = 0; i < most; ++i) {
       std::string_view ahead = line, word;
       if (!take_word(ahead, word)) return;
       const double value = number_of(word);
       if (!std::isfinite(value)) return;
-      if (to && i < 2) (*to)[i] = value;
+      if (i < 2) to[i] = value;
       line = ahead;
     }
   };
@@ -55,13 +61,15 @@ MtlMap read_map(std::string_view line, std::set<std::string>& notes) {
       break;
     line = ahead;
     if (option == "-o") {
-      take_numbers(3, &map.offset);
+      take_numbers(3, map.offset);
     } else if (option == "-s") {
-      take_numbers(3, &map.scale);
+      take_numbers(3, map.scale);
     } else if (option == "-t" || option == "-mm" || option == "-bm" || option == "-boost" ||
                option == "-texres") {
-      take_numbers(option == "-t" ? 3 : option == "-mm" ? 2 : 1, nullptr);
-      if (option != "-texres") notes.insert("the option " + std::string(option) + " of a map is not read");
+      glm::dvec2 values(0, option == "-mm" ? 1 : 0);
+      take_numbers(option == "-t" ? 3 : option == "-mm" ? 2 : 1, values);
+      if (!says_nothing(option, values))
+        notes.insert("the option " + std::string(option) + " of a map is not read");
     } else if (take_word(line, value)) {  // -clamp, -imfchan, -blendu, -blendv, -cc, -type
       if (option == "-clamp") map.clamp = value == "on";
       if (option == "-imfchan" && !value.empty()) map.channel = value[0];
@@ -108,8 +116,14 @@ void read_mtl(const std::filesystem::path& path, Budget& budget,
   MtlMaterial unnamed, *entry = &unnamed;
   bool rough_given = false, solid_given = false, color_given = false, emission_given = false;
   const auto end_material = [&] {
-    if (!color_given && !entry->color.file.empty()) entry->material.base_color = glm::vec3(1);
-    if (!emission_given && !entry->emission.file.empty()) entry->material.emission = glm::vec3(1);
+    const auto settle = [&](const char* name, bool given, const MtlMap& map, glm::vec3& factor) {
+      if (map.file.empty() || (given && factor != glm::vec3(0))) return;
+      if (given)
+        notes.insert(std::string(name) + " of 0 beside its map is taken as 1, it would leave nothing of it");
+      factor = glm::vec3(1);
+    };
+    settle("Kd", color_given, entry->color, entry->material.base_color);
+    settle("Ke", emission_given, entry->emission, entry->material.emission);
   };
   while (take_line(rest, line)) {
     if (!take_word(line, word)) continue;

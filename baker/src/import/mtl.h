@@ -26,9 +26,10 @@ struct MtlMaterial {
 };
 
 // Reads the materials of a .mtl file into `materials` by name; the first definition of a name counts. Kd and
-// Ke are taken as linear, and as 1 where only their map is given; d wins over Tr; Pr and Pm (the physically
-// based extension) win over a roughness derived from Ns. What is passed over is added to `notes`. Hostile
-// input is fine: what is not understood is skipped. Throws Failure kFile where it cannot be read.
+// Ke are taken as linear, and as 1 where only their map is given, or a factor of 0 beside it; d wins over Tr;
+// Pr and Pm (the physically based extension) win over a roughness derived from Ns. What is passed over is
+// added to `notes`. Hostile input is fine: what is not understood is skipped. Throws Failure kFile where it
+// cannot be read.
 void read_mtl(const std::filesystem::path& path, Budget& budget,
               std::map<std::string, MtlMaterial>& materials, std::set<std::string>& notes);
 

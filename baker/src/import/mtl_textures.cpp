@@ -49,7 +49,7 @@ Picture with_alpha(const Picture& color, const Picture& opacity, char channel) {
 }  // namespace
 
 uint32_t MtlTextures::add(const MtlMaterial& source, std::map<uint32_t, Surface>& surfaces) {
-  const uint32_t id = builder_.add_material(source.material);
+  const uint32_t id = builder_.add_material(file_, source.material);
   if (source.color.file.empty() && source.emission.file.empty() && source.opacity.file.empty()) return id;
   const Material& material = builder_.mesh().materials[id];
   Surface surface{material.base_color, material.emission, {AlphaMode::kBlend, material.opacity}, {}, {}};

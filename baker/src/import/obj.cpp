@@ -104,10 +104,11 @@ class ObjReader {
   }
 
   // What is not there is NaN: a vertex that takes part in a face then has the face refused by name.
-  static glm::dvec3 read_vector(std::string_view& line) {
+  glm::dvec3 read_vector(std::string_view& line) {
     glm::dvec3 vector(std::numeric_limits<double>::quiet_NaN());
     std::string_view word;
-    for (int i = 0; i < 3 && take_word(line, word); ++i) vector[i] = number_of(word);
+    for (int i = 0; i < 3 && take_word(line, word) && word.front() != '#'; ++i)
+      vector[i] = numbers_.read(word);
     return vector;
   }
 
@@ -154,6 +155,7 @@ class ObjReader {
     std::string words;
     for (const std::string& word : unknown_words_) words += (words.empty() ? "" : ", ") + word;
     if (!words.empty()) builder_.note(file_ + ": lines that begin with " + words + " are not read");
+    if (const std::string odd = numbers_.note(); !odd.empty()) builder_.note(file_ + ": " + odd);
     if (values_left_) builder_.note(file_ + ": weights and alpha of vertices are not read");
   }
 
@@ -265,7 +267,7 @@ class ObjReader {
             missing_names += (missing++ ? ", " : "") + name.substr(0, kLongest);
         }
         id = name.empty() && found == defined.end() ? builder_.default_material()
-             : found == defined.end()               ? builder_.add_material(fallback)
+             : found == defined.end()               ? builder_.add_material(file_, fallback)
                                                     : textures_.add(found->second, soup_.surfaces);
       }
       material = id;
@@ -289,6 +291,7 @@ class ObjReader {
   size_t libraries_tried_ = 0;
   uint64_t other_elements_ = 0;
   std::set<std::string> unknown_words_;
+  NumberReader numbers_;
   bool values_left_ = false;          // behind the coordinates or colours of vertices
   std::vector<glm::vec3> polypaint_;  // of #MRGB lines, by vertex
   bool bad_polypaint_ = false;

@@ -1,7 +1,9 @@
-// Geomview's OFF: [ST][C][N][4]OFF, ASCII. Texture coordinates are skipped.
+// Geomview's OFF: [ST][C][N][4]OFF as text; what is binary goes on in off_binary.cpp. Texture coordinates are
+// skipped.
 #include <algorithm>
 #include <cmath>
 
+#include "import/off_binary.h"
 #include "import/polygons.h"
 #include "import/readers.h"
 #include "import/source_file.h"
@@ -30,9 +32,17 @@ class Words {
     line_ = {};
     return held;
   }
+  size_t left_on_line() const {
+    std::string_view rest = line_, word;
+    size_t count = 0;
+    while (take_word(rest, word)) ++count;
+    return count;
+  }
   void put_back(std::string_view rest_of_word) {
     line_ = {rest_of_word.data(), size_t(line_.data() + line_.size() - rest_of_word.data())};
   }
+  // All that follows the line of the last word.
+  std::string_view behind_line() const { return text_; }
 
  private:
   bool next_line() {
@@ -49,7 +59,7 @@ class OffReader {
       : file_(file), words_(text), text_bytes_(text.size()), builder_(builder) {}
 
   void read() {
-    read_header();
+    if (read_header()) return read_binary_off(file_, keyword_, words_.behind_line(), builder_);
     const uint64_t vertex_count = read_count("vertices"), face_count = read_count("faces");
     words_.skip_line();  // the number of edges, often missing and never needed
     // A vertex takes at least six bytes, a face two.
@@ -68,6 +78,7 @@ class OffReader {
 
  private:
   void note_unread() {
+    if (const std::string odd = numbers_.note(); !odd.empty()) builder_.note(file_ + ": " + odd);
     if (vertex_values_left_)
       builder_.note(file_ + ": texture coordinates or other values behind those of vertices are not read");
     if (face_values_left_)
@@ -98,7 +109,8 @@ class OffReader {
     return uint64_t(value);
   }
 
-  void read_header() {
+  // Whether what follows is binary.
+  bool read_header() {
     std::string_view first = word();
     const std::string_view whole = first;
     const auto take = [&](std::string_view prefix) {
@@ -106,11 +118,11 @@ class OffReader {
       first.remove_prefix(prefix.size());
       return true;
     };
-    take("ST");
-    has_colors_ = take("C");
-    has_normals_ = take("N");
-    has_colors_ = take("C") || has_colors_;  // NCOFF occurs, its values in the order of CNOFF
-    homogeneous_ = take("4");
+    keyword_.has_texcoords = take("ST");
+    keyword_.has_colors = take("C");
+    keyword_.has_normals = take("N");
+    keyword_.has_colors = take("C") || keyword_.has_colors;  // NCOFF occurs, its values in the order of CNOFF
+    keyword_.homogeneous = take("4");
     if (take("n")) {
       throw Failure(Exit::kUnsupported, file_, "is an nOFF file, of any dimension; give one with three");
     }
@@ -119,33 +131,31 @@ class OffReader {
       int64_t number = 0;
       if (!integer_of(whole, number))
         throw Failure(Exit::kInvalid, file_, "does not start as an OFF file: export it again");
-      has_colors_ = has_normals_ = homogeneous_ = false;
+      keyword_ = {};
       first = whole;
     }
     words_.put_back(first);  // "OFF8 6 12" occurs
-    if (!first.empty()) return;
-    if (words_.line_goes_on()) {
-      Words ahead = words_;
-      std::string_view next;
-      ahead.next(next);
-      if (equals_ignoring_case(next, "BINARY")) {
-        throw Failure(Exit::kUnsupported, file_, "is a binary OFF file, export it as text");
-      }
-    }
+    Words ahead = words_;
+    std::string_view next;
+    if (!first.empty() || !ahead.next(next) || !equals_ignoring_case(next, "BINARY")) return false;
+    words_ = ahead;
+    return true;
   }
 
   void read_vertex() {
     glm::dvec3 position;
-    for (int i = 0; i < 3; ++i) position[i] = number_of(word());
-    if (homogeneous_) position /= number_of(word());
+    for (int i = 0; i < 3; ++i) position[i] = numbers_.read(word());
+    if (keyword_.homogeneous) position /= numbers_.read(word());
     push(soup_.positions, position);
-    if (has_normals_) {
+    if (keyword_.has_normals) {
       glm::vec3 normal;
-      for (int i = 0; i < 3; ++i) normal[i] = float(number_of(word()));
+      for (int i = 0; i < 3; ++i) normal[i] = float(numbers_.read(word()));
       push(soup_.normals, normal);
     }
     glm::vec3 color = kNoColor;
-    const bool given = has_colors_ && read_color(color);
+    // Texture coordinates stand behind the colour, which may have an alpha or not.
+    const size_t behind = keyword_.has_texcoords ? 2 : 0;
+    const bool given = keyword_.has_colors && read_color(color, behind);
     if (given || !soup_.colors.empty()) {
       while (soup_.colors.size() + 1 < soup_.positions.size()) push(soup_.colors, kNoColor);
       push(soup_.colors, color);
@@ -153,8 +163,9 @@ class OffReader {
     vertex_values_left_ = words_.skip_line() || vertex_values_left_;
   }
 
-  // Three numbers; what follows them is left. False, with nothing read, where there are not three.
-  bool read_color(glm::vec3& color) {
+  // Three numbers and, where more than `behind` of them follow, alpha; the rest is left. False, with nothing
+  // read, where there are not three.
+  bool read_color(glm::vec3& color, size_t behind) {
     Words ahead = words_;
     double values[3];
     for (double& value : values) {
@@ -166,7 +177,7 @@ class OffReader {
     words_ = ahead;
     color = glm::vec3(values[0], values[1], values[2]);
     std::string_view alpha;
-    if (words_.line_goes_on()) {
+    if (words_.left_on_line() > behind) {
       words_.next(alpha);
       const double value = number_of(alpha);
       translucent_ = translucent_ || (value != 255 && value != 1);
@@ -181,10 +192,10 @@ class OffReader {
       int64_t index = -1;
       const bool good = integer_of(word(), index) && index >= 0 && index < int64_t{kNoIndex};
       push(soup_.corners, good ? uint32_t(index) : kNoIndex);
-      if (has_normals_) push(soup_.corner_normals, soup_.corners.back());
+      if (keyword_.has_normals) push(soup_.corner_normals, soup_.corners.back());
     }
     glm::vec3 color = kNoColor;
-    colored_ = read_color(color) || colored_;
+    colored_ = read_color(color, 0) || colored_;
     face_values_left_ = words_.skip_line() || face_values_left_;
     if (soup_.end_face(file_, builder_.budget())) push(soup_.face_colors, color);
   }
@@ -194,9 +205,8 @@ class OffReader {
   const uint64_t text_bytes_;
   MeshBuilder& builder_;
   PolygonSoup soup_;
-  bool has_normals_ = false;
-  bool homogeneous_ = false;
-  bool has_colors_ = false;
+  OffKeyword keyword_;
+  NumberReader numbers_;
   bool colored_ = false;  // some face is
   bool vertex_values_left_ = false, face_values_left_ = false, translucent_ = false;
 };

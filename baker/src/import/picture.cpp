@@ -52,6 +52,11 @@ Picture decode_webp(const std::string& file, std::string_view bytes, Budget& bud
   Picture picture;
   why = "is damaged WebP";
   if (!WebPGetInfo(data, bytes.size(), &width, &height) || width <= 0 || height <= 0) return picture;
+  if (WebPBitstreamFeatures features;
+      WebPGetFeatures(data, bytes.size(), &features) == VP8_STATUS_OK && features.has_animation) {
+    why = "is animated WebP, which is not read";
+    return picture;
+  }
   budget.charge(file, uint64_t(width) * uint64_t(height), 8);
   picture.rgba.resize(size_t(width) * size_t(height) * 4);
   if (!WebPDecodeRGBAInto(data, bytes.size(), picture.rgba.data(), picture.rgba.size(), width * 4)) return {};

@@ -70,15 +70,12 @@ class PlyReader {
   }
 
   void note_unread_bytes() {
+    if (const std::string odd = body_.numbers().note(); !odd.empty()) builder_.note(file_ + ": " + odd);
     if (body_.passed_over())
       builder_.note(file_ + ": lines hold more values than the header declares, they are not read");
     if (const size_t bytes = body_.tail(); bytes > 0) {
       builder_.note(file_ + ": " + std::to_string(bytes) +
                     " bytes after what the header declares are not read");
-    }
-    if (soup_.face_ends.empty() && soup_.too_small == 0 && !soup_.positions.empty()) {
-      builder_.note(file_ + ": its " + std::to_string(soup_.positions.size()) +
-                    " vertices have no faces, they are a cloud of points");
     }
   }
 

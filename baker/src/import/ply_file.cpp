@@ -34,6 +34,7 @@ Header read_header(const std::string& file, std::string_view& text) {
   std::string_view line, word;
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
   if (!take_line(text, line) || trim(line) != "ply") fail(file, "does not start as a PLY file");
+  const bool bare_cr = text.data() == line.data() + line.size() + 1 && text.data()[-1] == '\r';
   bool encoded = false;
   while (take_line(text, line)) {
     if (!take_word(line, word) || word == "obj_info") continue;
@@ -43,6 +44,9 @@ Header read_header(const std::string& file, std::string_view& text) {
     }
     if (word == "end_header") {
       if (!encoded) fail(file, "names no format in its header");
+      // Where lines end in CR alone, an LF behind the last is the body's first byte.
+      if (bare_cr && header.encoding != Encoding::kAscii && text.data()[-1] == '\n')
+        text = {text.data() - 1, text.size() + 1};
       return header;
     }
     if (word == "format") {
@@ -76,7 +80,7 @@ Header read_header(const std::string& file, std::string_view& text) {
         good = good && take_word(line, word) && type_of(word, property.count_type) && take_word(line, word);
       }
       if (!good || !type_of(word, property.type) || !take_word(line, word)) {
-        fail(file, "has a property without a known type in its header");
+        fail(file, "has a property of type " + printable(word) + " in its header, which PLY does not know");
       }
       property.name = word;
       header.elements.back().properties.push_back(std::move(property));

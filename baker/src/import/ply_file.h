@@ -67,7 +67,7 @@ class Body {
   size_t left() const { return bytes_.size(); }
 
   double number(Type type) {
-    if (encoding_ == Encoding::kAscii) return number_of(word());
+    if (encoding_ == Encoding::kAscii) return numbers_.read(word());
     switch (type) {
       case Type::kInt8:
         return double(binary<int8_t>());
@@ -106,6 +106,7 @@ class Body {
     passed_over_ = passed_over_ || !trim(bytes_.substr(0, end)).empty();
     bytes_.remove_prefix(end);
   }
+  const NumberReader& numbers() const { return numbers_; }
   // Whether lines held values that the header does not declare.
   bool passed_over() const { return passed_over_; }
   // Bytes that are not blank behind what was read.
@@ -166,6 +167,7 @@ class Body {
   const std::string& file_;
   std::string_view bytes_;
   const Encoding encoding_;
+  NumberReader numbers_;
   bool passed_over_ = false;
 };
 

@@ -9,12 +9,9 @@
 namespace lsp {
 namespace {
 
-// Point tests allowed for one file's concave polygons: seconds.
-constexpr uint64_t kEarWork = 300'000'000;
-
-double area2(const glm::dvec2& a, const glm::dvec2& b, const glm::dvec2& c) {
-  return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
-}
+// Steps allowed for one file's concave polygons: some for each corner, which are ten times what people's
+// take.
+constexpr uint64_t kEarWork = 300'000'000, kEarWorkACorner = 1'500;
 
 void fan(std::span<const uint32_t> ring, std::vector<glm::uvec3>& out) {
   for (size_t i = 2; i < ring.size(); ++i) out.push_back({ring[0], ring[i - 1], ring[i]});
@@ -79,7 +76,9 @@ void PolygonSoup::make_colors_linear() {
     for (const glm::vec3& color : *list) {
       for (int i = 0; i < 3; ++i) largest = std::isfinite(color[i]) ? std::max(largest, color[i]) : largest;
     }
-    const double scale = largest > 1 ? 255 : 1;
+    constexpr float kMostOvershoot = 2;  // filters and tools that mix colours end a little above 1
+    const double scale = largest > kMostOvershoot ? 255 : 1;
+    colors_cut = colors_cut || double(largest) > scale;
     for (glm::vec3& color : *list) {
       for (int i = 0; i < 3; ++i) {
         const double value = std::isfinite(color[i]) ? std::clamp(double(color[i]) / scale, 0.0, 1.0) : 1.0;
@@ -129,7 +128,7 @@ template <typename Add>
 void cut_faces(const std::string& file, const PolygonSoup& soup, MeshBuilder& builder, const Add& add) {
   std::vector<glm::dvec3> polygon;
   std::vector<glm::uvec3> cut;
-  uint64_t work = kEarWork, crossed = 0;
+  uint64_t work = std::max(kEarWork, kEarWorkACorner * soup.corners.size()), crossed = 0;
   uint32_t begin = 0;
   for (uint32_t face = 0; face < soup.face_ends.size(); ++face) {
     const uint32_t end = soup.face_ends[face];
@@ -155,6 +154,12 @@ void cut_faces(const std::string& file, const PolygonSoup& soup, MeshBuilder& bu
   }
 }
 
+// Whether a corner has texture coordinates that say something.
+bool has_place(const PolygonSoup& soup, uint32_t corner) {
+  const uint32_t uv = corner < soup.corner_texcoords.size() ? soup.corner_texcoords[corner] : kNoIndex;
+  return uv < soup.texcoords.size() && std::isfinite(soup.texcoords[uv].x + soup.texcoords[uv].y);
+}
+
 // A colour for each piece.
 std::vector<TriangleColor> piece_colors(const std::string& file, const PolygonSoup& soup,
                                         std::span<const Piece> pieces, MeshBuilder& builder) {
@@ -173,8 +178,7 @@ std::vector<TriangleColor> piece_colors(const std::string& file, const PolygonSo
     for (size_t t = 0; t < list.size() && surface.has_textures() && !unplaced; ++t) {
       for (int i = 0; i < 3; ++i) {
         const uint32_t corner = pieces[list[t]].corners[i];
-        unplaced = unplaced || corner >= soup.corner_texcoords.size() ||
-                   soup.corner_texcoords[corner] >= soup.texcoords.size();
+        unplaced = unplaced || !has_place(soup, corner);
       }
     }
     const std::vector<TriangleColor> own =
@@ -182,9 +186,8 @@ std::vector<TriangleColor> piece_colors(const std::string& file, const PolygonSo
           const Piece& piece = pieces[list[t]];
           for (int i = 0; i < 3; ++i) {
             const uint32_t corner = piece.corners[i];
-            const uint32_t uv =
-                corner < soup.corner_texcoords.size() ? soup.corner_texcoords[corner] : kNoIndex;
-            const glm::dvec2 at = uv < soup.texcoords.size() ? soup.texcoords[uv] : glm::dvec2(0);
+            const glm::dvec2 at =
+                has_place(soup, corner) ? soup.texcoords[soup.corner_texcoords[corner]] : glm::dvec2(0);
             out[i].base_uv = surface.base.place(at);
             out[i].glow_uv = surface.glow.place(at);
             out[i].color = glm::vec4(1);
@@ -196,7 +199,9 @@ std::vector<TriangleColor> piece_colors(const std::string& file, const PolygonSo
     for (size_t i = 0; i < list.size(); ++i) colors[list[i]] = own[i];
   }
   if (unplaced)
-    builder.note(file + ": faces have a texture and no texture coordinates, its corner texel holds");
+    builder.note(
+        file +
+        ": faces have a texture and no texture coordinates, or no finite ones, its corner texel holds");
   return colors;
 }
 
@@ -228,6 +233,11 @@ void add_polygons(const std::string& file, const PolygonSoup& soup, MeshBuilder&
     cut_faces(file, soup, builder, [&](const Piece& piece) { add(piece, nullptr); });
   }
   builder.end();
+  if (soup.face_ends.empty() && soup.too_small == 0 && !soup.positions.empty()) {
+    builder.note(file + ": its " + std::to_string(soup.positions.size()) +
+                 " vertices have no faces, they are a cloud of points");
+  }
+  if (soup.colors_cut) builder.note(file + ": colours above 1 are cut to it");
   if (soup.too_small) {
     builder.note(file + ": " + std::to_string(soup.too_small) +
                  " faces with fewer than three corners hold no triangle");

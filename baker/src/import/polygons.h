@@ -32,14 +32,15 @@ struct PolygonSoup {
   std::vector<glm::vec3> colors;           // per position; linear once make_colors_linear() was called
   std::vector<glm::vec3> face_colors;      // per face, likewise
   std::map<uint32_t, Surface> surfaces;    // of materials with textures
+  bool colors_cut = false;                 // by make_colors_linear()
   uint64_t too_small = 0;                  // faces with fewer than three corners, not in the lists
 
   // Ends a face whose corners were appended since the last one. One with fewer than three is dropped and
   // counted: it holds no triangle. True where it was kept.
   bool end_face(const std::string& file, Budget& budget);
   uint64_t triangle_count() const;
-  // Colours, as files give them, are on the sRGB curve: from 0 to 255 where any is above 1, else from 0 to 1.
-  // What is no number (kNoColor) becomes white.
+  // Colours, as files give them, are on the sRGB curve: from 0 to 255 where any is above 2, else from 0 to 1,
+  // and what is a little above is cut. What is no number (kNoColor) becomes white.
   void make_colors_linear();
   bool has_colors() const { return !colors.empty() || !face_colors.empty() || !surfaces.empty(); }
 };
@@ -49,7 +50,7 @@ struct PolygonSoup {
 void add_polygons(const std::string& file, const PolygonSoup& soup, MeshBuilder& builder);
 
 // Cuts a polygon into corners.size() - 2 triangles of corner numbers, appended to `out`. Convex polygons (and
-// those without any area) become a fan from corner 0. `work` is what is left of the number of point tests
+// those without any area) become a fan from corner 0. `work` is what is left of the number of steps
 // allowed, so that hostile polygons cost bounded time; at 0 only fans are made.
 EarCut triangulate(std::span<const glm::dvec3> corners, std::vector<glm::uvec3>& out, uint64_t& work);
 

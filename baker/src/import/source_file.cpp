@@ -109,6 +109,10 @@ std::string read_file(const std::filesystem::path& path, Budget& budget) {
     done += size_t(got);
   }
   bytes.resize(done);
+  if (bytes.starts_with("version https://git-lfs.github.com/spec/")) {
+    throw Failure(Exit::kInvalid, path.string(),
+                  "is a pointer of Git LFS and not the file itself, run git lfs pull");
+  }
   return bytes;
 }
 

@@ -83,6 +83,10 @@ uint32_t count_triangles(const std::string& file, std::string_view bytes, MeshBu
   const uint64_t declared = binary_count(bytes), fits = (bytes.size() - kHeaderBytes) / kTriangleBytes;
   const bool whole = (bytes.size() - kHeaderBytes) % kTriangleBytes == 0;
   if (declared == fits && whole) return uint32_t(declared);
+  if (whole && fits > 0 && __builtin_bswap32(uint32_t(declared)) == fits) {
+    throw Failure(Exit::kInvalid, file,
+                  "has its bytes in the wrong order, the highest first; export it with the lowest first");
+  }
   bool all = fits > 0 && fits < kNoIndex && (whole || declared == 0), any = declared > fits;
   for (uint64_t i = std::min(declared, fits); i < fits && all; ++i) {
     const Looks looks = look_at(bytes.substr(kHeaderBytes + i * kTriangleBytes, kTriangleBytes));
@@ -172,10 +176,10 @@ void read_binary(const std::string& file, std::string_view bytes, uint32_t count
   soup.make_colors_linear();
 }
 
-glm::dvec3 read_vector(std::string_view& line) {
+glm::dvec3 read_vector(std::string_view& line, NumberReader& numbers) {
   glm::dvec3 vector(std::numeric_limits<double>::quiet_NaN());
   std::string_view word;
-  for (int i = 0; i < 3 && take_word(line, word); ++i) vector[i] = number_of(word);
+  for (int i = 0; i < 3 && take_word(line, word); ++i) vector[i] = numbers.read(word);
   return vector;
 }
 
@@ -187,16 +191,17 @@ void read_ascii(const std::string& file, std::string_view text, PolygonSoup& sou
   std::string_view line, word;
   uint32_t normal = kNoIndex;
   std::set<std::string> unknown;
+  NumberReader numbers;
   const auto start_facet = [&] {
     normal = uint32_t(soup.normals.size());
-    budget.push_back(file, soup.normals, glm::vec3(read_vector(line)));
+    budget.push_back(file, soup.normals, glm::vec3(read_vector(line, numbers)));
   };
   while (take_line(text, line)) {
     while (take_word(line, word)) {
       const auto is = [&](std::string_view keyword) { return equals_ignoring_case(word, keyword); };
       if (is("vertex")) {
         budget.push_back(file, soup.corners, uint32_t(soup.positions.size()));
-        budget.push_back(file, soup.positions, read_vector(line));
+        budget.push_back(file, soup.positions, read_vector(line, numbers));
         budget.push_back(file, soup.corner_normals, normal);
       } else if (is("facet")) {
         take_word(line, word);  // "normal"
@@ -216,9 +221,26 @@ void read_ascii(const std::string& file, std::string_view text, PolygonSoup& sou
   }
   std::string words;
   for (const std::string& text_word : unknown) words += (words.empty() ? "" : ", ") + text_word;
+  if (const std::string odd = numbers.note(); !odd.empty()) builder.note(file + ": " + odd);
   if (!words.empty()) builder.note(file + ": lines that begin with " + words + " are not read");
   if (soup.corners.size() != (soup.face_ends.empty() ? 0 : soup.face_ends.back())) {
     throw Failure(Exit::kInvalid, file, "ends inside a facet, it is cut short: export or copy it again");
+  }
+}
+
+// A normal of zero length asks for the triangle's own; many programs write no other.
+void fill_normals(PolygonSoup& soup) {
+  size_t begin = 0;
+  for (const uint32_t end : soup.face_ends) {
+    const uint32_t normal = soup.corner_normals[begin];
+    const auto at = [&](size_t corner) { return soup.positions[soup.corners[corner]]; };
+    const glm::dvec3 origin = at(begin);
+    glm::dvec3 area(0);
+    for (size_t i = begin + 2; i < end; ++i) area += glm::cross(at(i - 1) - origin, at(i) - origin);
+    const double largest = std::max(std::abs(area.x), std::max(std::abs(area.y), std::abs(area.z)));
+    if (normal != kNoIndex && soup.normals[normal] == glm::vec3(0) && largest > 0 && std::isfinite(largest))
+      soup.normals[normal] = glm::vec3(area / largest);
+    begin = end;
   }
 }
 
@@ -245,6 +267,7 @@ void read_stl(const std::filesystem::path& path, MeshBuilder& builder) {
     throw Failure(Exit::kInvalid, file,
                   "is no STL file, neither text nor long enough for a header: export it again");
   }
+  fill_normals(soup);
   add_polygons(file, soup, builder);
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <string>
 #include <string_view>
 
 namespace lsp {
@@ -61,6 +62,31 @@ inline double number_of(std::string_view word) {
   }
   return result.ec == std::errc() ? value : kNan;
 }
+
+// Reads numbers and keeps the first word that is none, nor says that there is none ("nan", "-1.#IND"):
+// programs write the decimal point of their country.
+class NumberReader {
+ public:
+  double read(std::string_view word) {
+    const double value = number_of(word);
+    if (std::isnan(value) && odd_.empty() && is_odd(word)) odd_ = word.substr(0, 32);
+    return value;
+  }
+  // Empty where all were numbers.
+  std::string note() const {
+    return odd_.empty() ? odd_
+                        : odd_ + " and the like stand where numbers belong, what they are part of is lost";
+  }
+
+ private:
+  static bool is_odd(std::string_view word) {
+    const bool is_signed = !word.empty() && (word.front() == '-' || word.front() == '+');
+    const std::string_view start = word.substr(is_signed, 3);
+    const bool is_nan = start == "nan" || start == "NaN" || start == "NAN";
+    return !is_nan && word.find('#') == word.npos;
+  }
+  std::string odd_;
+};
 
 // A decimal integer. False where `word` is anything else.
 inline bool integer_of(std::string_view word, int64_t& value) {

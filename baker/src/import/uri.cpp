@@ -65,6 +65,11 @@ std::filesystem::path resolve_uri(const std::filesystem::path& document, std::st
     throw Failure(Exit::kInvalid, document.string(),
                   "names a file with a zero byte in its name, export it again");
   }
+  if (decoded.starts_with("http://") || decoded.starts_with("https://")) {
+    throw Failure(
+        Exit::kFile, document.string(),
+        "names a file on the network, which is not asked: put it beside the document and name it there");
+  }
   std::string slashes = decoded;
   std::replace(slashes.begin(), slashes.end(), '\\', '/');
   const std::string local = decoded.starts_with("file://") ? decoded.substr(7) : decoded;
