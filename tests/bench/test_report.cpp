@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "answers.h"
+#include "lsp/in_chunks.hpp"
 #include "picture_page.h"
 #include "report.h"
 #include "timing.h"
@@ -223,8 +224,9 @@ TEST(Timing, ChunksCoverEverythingOnce) {
     });
     EXPECT_GT(seconds, 0);
     for (const auto& count : touched) ASSERT_EQ(count, 1);
-    EXPECT_THROW(run_in_chunks(10, threads, [](size_t, size_t) { throw std::runtime_error("no"); }),
-                 std::runtime_error);
+    EXPECT_THROW(
+        run_in_chunks(touched.size(), threads, [](size_t, size_t) { throw std::runtime_error("no"); }),
+        std::runtime_error);
   }
 }
 
