@@ -42,14 +42,6 @@ Report sample() {
   return report;
 }
 
-TEST(Report, Base64) {
-  EXPECT_EQ(base64(""), "");
-  EXPECT_EQ(base64("M"), "TQ==");
-  EXPECT_EQ(base64("Ma"), "TWE=");
-  EXPECT_EQ(base64("Man"), "TWFu");
-  EXPECT_EQ(base64(std::string("\xff\xfe\xfd\x00", 4)), "//79AA==");
-}
-
 TEST(Report, CsvQuotesAndKeepsPrecision) {
   EXPECT_EQ(to_csv(sample().sections[0].tables[0]),
             "name,value\n\"a, \"\"b\"\"\",1234567\ntiny,1.25e-07\nnone,\n");
