@@ -21,6 +21,7 @@
 #include "meshes.h"
 #include "surface_rays.h"
 #include "trace_shader.h"
+#include "traced.h"
 #include "writer.h"
 
 // Drivers leave memory behind, in modules that are gone at the end: leaks are looked for in the other tests.
@@ -140,13 +141,6 @@ Names operator+(Names a, const Names& b) {
 
 lsp_trace_options by_tables(uint32_t quality, uint32_t flags = 0) {
   return {LSP_TRACE_APPROXIMATE | flags, 0, quality};
-}
-
-std::vector<LspHit> on_cpu(const lsp_scene& scene, const lsp_trace_options& options,
-                           const std::vector<LspRay>& rays) {
-  std::vector<LspHit> hits(rays.size());
-  EXPECT_EQ(lsp_trace(&scene, &options, rays.data(), hits.data(), rays.size(), nullptr, nullptr), LSP_OK);
-  return hits;
 }
 
 // Of occlusion all that is asked is whether t is finite.
@@ -331,10 +325,10 @@ TEST(Loading, TheCpuReadsTheSameSections) {
       lsp_trace_options options{occlusion != 0 ? LSP_TRACE_OCCLUSION : 0u, 0, LSP_QUALITY_ACCURATE};
       if (kinds != LSP_USE_EXACT) options.flags |= LSP_TRACE_APPROXIMATE;
       if (kinds == LSP_USE_TABLES) options.quality = LSP_QUALITY_FAST;
-      const std::vector<LspHit> truth = on_cpu(scene, options, rays);
+      const std::vector<LspHit> truth = trace(scene, options, rays);
       const Names names = sections_for(scene, kinds | occlusion);
       const Unreadable others(scene, names);
-      EXPECT_EQ(differing(on_cpu(scene, options, rays), truth, false), 0u);
+      EXPECT_EQ(differing(trace(scene, options, rays), truth, false), 0u);
       lsp_trace_counts counts{};  // counted rays go one after the other
       LspHit hit;
       EXPECT_EQ(lsp_trace(&scene, &options, rays.data(), &hit, 1, &counts, nullptr), LSP_OK);
@@ -390,7 +384,7 @@ void expect_answers_of_the_whole_file(const BakedScene& scene, uint32_t uses, ui
   if ((uses & LSP_USE_EXACT) != 0) options.flags &= ~LSP_TRACE_APPROXIMATE;
   tracer.trace(options, rays, hits);
   if ((uses & LSP_USE_TABLES) != 0) options.quality = LSP_QUALITY_FAST;
-  EXPECT_EQ(differing(hits, on_cpu(*scene, options, rays), occlusion), 0u) << uses;
+  EXPECT_EQ(differing(hits, trace(*scene, options, rays), occlusion), 0u) << uses;
 }
 
 TEST_P(LoadingOnVulkan, AnswersAreThoseOfTheWholeFile) {
@@ -566,12 +560,12 @@ TEST(Loading, FinerDataArrivesAndLeavesBetweenFrames) {
   engine->submit(next, balanced);
   engine->submit(next, {0, 0});
   now = std::move(next);  // the buffers are all kept
-  const auto truth = on_cpu(scene, by_tables(LSP_QUALITY_FAST), rays);
+  const auto truth = trace(scene, by_tables(LSP_QUALITY_FAST), rays);
   const std::vector<std::vector<LspHit>> hits = engine->finish();
   ASSERT_EQ(hits.size(), frames + 2);
   for (size_t i = 0; i < frames; ++i) EXPECT_EQ(differing(hits[i], truth, false), 0u) << "frame " << i;
-  EXPECT_EQ(differing(hits[frames], on_cpu(scene, balanced, rays), false), 0u);
-  EXPECT_EQ(differing(hits[frames + 1], on_cpu(scene, {0, 0}, rays), false), 0u);
+  EXPECT_EQ(differing(hits[frames], trace(scene, balanced, rays), false), 0u);
+  EXPECT_EQ(differing(hits[frames + 1], trace(scene, {0, 0}, rays), false), 0u);
 
   const lsp_trace_options occlusion = by_tables(LSP_QUALITY_BALANCED, LSP_TRACE_OCCLUSION);
   engine->submit(now, balanced);  // the last that reads what goes
@@ -583,8 +577,8 @@ TEST(Loading, FinerDataArrivesAndLeavesBetweenFrames) {
   now = std::move(next);  // here the dropped buffers end
   engine->submit(now, occlusion);
   const auto last = engine->finish();
-  EXPECT_EQ(
-      differing(last.at(0), on_cpu(scene, by_tables(LSP_QUALITY_FAST, LSP_TRACE_OCCLUSION), rays), true), 0u);
+  EXPECT_EQ(differing(last.at(0), trace(scene, by_tables(LSP_QUALITY_FAST, LSP_TRACE_OCCLUSION), rays), true),
+            0u);
   for (const std::string& message : engine->messages()) ADD_FAILURE() << message;
 }
 
