@@ -6,6 +6,8 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "qualities.h"
+
 namespace lsp {
 
 using Json = nlohmann::ordered_json;
@@ -42,23 +44,12 @@ Json to_json(const MeasuredError& e) {
           {"depth_error_percent_of_diagonal", 100 * e.depth_error}};
 }
 
-namespace {
-
-struct NamedQuality {
-  const char* name;
-  uint32_t quality;
-};
-constexpr NamedQuality kQualities[] = {
-    {"fast", LSP_QUALITY_FAST}, {"balanced", LSP_QUALITY_BALANCED}, {"accurate", LSP_QUALITY_ACCURATE}};
-
-bool is_measured(const Qualities& qualities) { return qualities[LSP_QUALITY_FAST].cpu > 0; }
-
-}  // namespace
-
 Json to_json(const Qualities& qualities) {
-  if (!is_measured(qualities)) return nullptr;
+  if (!(qualities[LSP_QUALITY_FAST].cpu > 0)) return nullptr;
+  constexpr std::pair<const char*, uint32_t> kNamed[] = {
+      {"fast", LSP_QUALITY_FAST}, {"balanced", LSP_QUALITY_BALANCED}, {"accurate", LSP_QUALITY_ACCURATE}};
   Json list;
-  for (const auto& [name, quality] : kQualities) {
+  for (const auto& [name, quality] : kNamed) {
     const QualityFigures& q = qualities[quality];
     list[name] = {{"wrong_percent", 100 * q.wrong},
                   {"depth_error_percent_of_diagonal", 100 * q.depth},
@@ -88,14 +79,7 @@ void print_error(const MeasuredError& error) {
 }
 
 void print_qualities(const Qualities& qualities) {
-  if (!is_measured(qualities)) return;
-  for (const auto& [name, quality] : kQualities) {
-    const QualityFigures& q = qualities[quality];
-    std::printf(
-        "%-11s %.1f %% wrong, depth off by %.1f %%, ambient occlusion by %.1f %%, light by %.1f %%; about "
-        "%.1fx exact rays on Vulkan, %.1fx on the CPU\n",
-        name, 100 * q.wrong, 100 * q.depth, 100 * q.occlusion, 100 * q.light, q.vulkan, q.cpu);
-  }
+  std::fputs(format::qualities_text(to_json(qualities)).c_str(), stdout);
 }
 
 void print_sections(const std::vector<WrittenSection>& sections) {

@@ -6,20 +6,14 @@
 
 #include "line_space.h"
 #include "octahedral.h"
+#include "vec.h"
 
 namespace lsp::corpus {
 namespace {
 
-struct Vec {
-  double x, y, z;
-  double operator[](int axis) const { return axis == 0 ? x : axis == 1 ? y : z; }
-};
-Vec operator-(const Vec& a, const Vec& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-Vec cross(const Vec& a, const Vec& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-double dot(const Vec& a, const Vec& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-Vec to_vec(const lsp_float3& v) { return {v.x, v.y, v.z}; }
+using format::to_vec;
+using format::Vec;
+
 lsp_float3 to_float3(const Vec& v) {
   return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
 }

@@ -12,6 +12,7 @@
 #include "layers.h"
 #include "line_space.h"
 #include "octahedral.h"
+#include "vec.h"
 #include "wide.h"
 
 namespace lsp::format {
@@ -42,15 +43,10 @@ Box box_of(const LspTriangle& t) {
 
 // Two equal corners, or an area below 1e-14 of the longest edge squared.
 bool degenerate(const LspTriangle& t) {
-  const auto edge = [](const lsp_float3& a, const lsp_float3& b) {
-    return std::array<double, 3>{double{b.x} - a.x, double{b.y} - a.y, double{b.z} - a.z};
-  };
-  const auto dot = [](const std::array<double, 3>& a) { return a[0] * a[0] + a[1] * a[1] + a[2] * a[2]; };
-  const auto a = edge(t.v0, t.v1), b = edge(t.v0, t.v2), c = edge(t.v1, t.v2);
-  const std::array<double, 3> normal = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
-                                        a[0] * b[1] - a[1] * b[0]};
-  const double longest = std::max({dot(a), dot(b), dot(c)});
-  return !(0.5 * std::sqrt(dot(normal)) > 1e-14 * longest);
+  const Vec a = to_vec(t.v1) - to_vec(t.v0), b = to_vec(t.v2) - to_vec(t.v0), c = to_vec(t.v2) - to_vec(t.v1);
+  const Vec normal = cross(a, b);
+  const double longest = std::max({dot(a, a), dot(b, b), dot(c, c)});
+  return !(0.5 * std::sqrt(dot(normal, normal)) > 1e-14 * longest);
 }
 
 constexpr uint64_t kNoLeaf = ~uint64_t{0};

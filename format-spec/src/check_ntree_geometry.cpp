@@ -8,22 +8,10 @@
 #include <cstddef>
 
 #include "layers.h"
+#include "vec.h"
 
 namespace lsp::format {
 namespace {
-
-struct Vec {
-  double x, y, z;
-  double operator[](int axis) const { return axis == 0 ? x : axis == 1 ? y : z; }
-};
-Vec to_vec(const lsp_float3& v) { return {v.x, v.y, v.z}; }
-Vec operator+(const Vec& a, const Vec& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-Vec operator-(const Vec& a, const Vec& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-Vec operator*(const Vec& a, double s) { return {a.x * s, a.y * s, a.z * s}; }
-double dot(const Vec& a, const Vec& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-Vec cross(const Vec& a, const Vec& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
 
 // A cube of cells: the root's or a cell's, by its global coordinates at its level.
 struct Cube {

@@ -217,12 +217,6 @@ constexpr bool complete() {
   }
   return at == sizeof(T);
 }
-static_assert(complete<LspHeader>() && complete<LspSection>() && complete<LspNode>() && complete<LspCell>() &&
-              complete<LspTriangle>() && complete<LspCornerNormals>() && complete<LspMaterial>() &&
-              complete<LspLineSpace>() && complete<LspBitWord>() && complete<LspFilledCell>() &&
-              complete<LspPlane>() && complete<LspSplit>() && complete<LspCellNode>() &&
-              complete<LspWideNode>());
-
 constexpr Struct kStructs[] = {
     describe<LspHeader>("LspHeader"),     describe<LspSection>("LspSection"),
     describe<LspNode>("LspNode"),         describe<LspCell>("LspCell"),
@@ -232,6 +226,23 @@ constexpr Struct kStructs[] = {
     describe<LspPlane>("LspPlane"),       describe<LspSplit>("LspSplit"),
     describe<LspCellNode>("LspCellNode"), describe<LspWideNode>("LspWideNode"),
 };
+
+constexpr const Struct* find_struct(std::string_view name) {
+  for (const Struct& candidate : kStructs)
+    if (candidate.name == name) return &candidate;
+  return nullptr;
+}
+
+template <class T>
+constexpr bool described(const char* name) {
+  if constexpr (std::is_same_v<T, uint32_t>)
+    return true;  // a word has no fields
+  else
+    return find_struct(name) != nullptr && complete<T>();
+}
+static_assert(described<LspHeader>("LspHeader") && described<LspSection>("LspSection"));
+#define LSP_ARRAY_SECTION(Name, TYPE, code, Element, ...) static_assert(described<Element>(#Element));
+#include "lsp/sections.def"
 
 template <class T>
 T load(const std::byte* bytes) {
@@ -317,16 +328,6 @@ uint32_t Field::count() const {
 }
 
 std::span<const Struct> structs() { return kStructs; }
-
-namespace {
-
-const Struct* find_struct(std::string_view name) {
-  for (const Struct& candidate : kStructs)
-    if (candidate.name == name) return &candidate;
-  return nullptr;
-}
-
-}  // namespace
 
 const Struct& struct_named(const char* name) {
   if (const Struct* found = find_struct(name)) return *found;

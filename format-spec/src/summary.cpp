@@ -11,6 +11,7 @@
 #include "fields.h"
 #include "layers.h"
 #include "line_space.h"
+#include "qualities.h"
 #include "wide.h"
 
 namespace lsp::format {
@@ -414,7 +415,12 @@ std::string summary_text(const Json& j, const std::string& section) {
                  j["wide"]["nodes"].get<unsigned long long>(), j["wide"]["children_per_node"].get<double>(),
                  j["wide"]["leaves"].get<unsigned long long>(), j["wide"]["triangles_per_leaf"].get<double>(),
                  j["wide"]["depth"].get<unsigned long long>());
-  if (j.contains("cells")) text += cells_text(j["cells"]);
+  if (j.contains("cells")) {
+    text += cells_text(j["cells"]);
+    const Json meta = j.value("provenance", Json());
+    const std::string qualities = meta.is_object() ? qualities_text(meta.value("qualities", Json())) : "";
+    if (!qualities.empty()) text += "\n" + qualities;
+  }
   text += "\n" + head;
   for (const Json& s : j["sections"]) text += section_line(s);
   text += line("  padding %25llu\n", j["padding_bytes"].get<unsigned long long>());

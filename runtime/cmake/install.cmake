@@ -13,7 +13,7 @@ if(LSP_VULKAN)
   list(APPEND libraries lsp_vulkan)
   list(APPEND headers lsp_vulkan.h parts.h)
 endif()
-set(shader_include lsp.glsl lsp_addresses.glsl lsp_descriptors.glsl lsp_instances.glsl parts.h arithmetic.h traverse.h
+set(shader_include lsp.glsl lsp_instances.glsl lsp_sections.glsl parts.h arithmetic.h traverse.h
   bvh.h ntree.h cells.h wide.h instance_walk.h)
 list(TRANSFORM headers PREPEND include/lsp/)
 list(TRANSFORM shader_include PREPEND include/lsp/)

@@ -73,8 +73,7 @@ extern "C" lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options*
   const uint32_t features = scene->header->required_features;
   const bool approximate = lsp::is_approximate(*scene, *options);
   const bool partial = (features & LSP_FEATURE_COVERAGE) != 0;
-  uint32_t flags = options->flags;
-  if ((flags & LSP_TRACE_OCCLUSION) != 0) flags |= LSP_TRACE_ANY_HIT;
+  uint32_t flags = LSP_TRACE_IMPLIED(options->flags);
   const bool any_hit = (flags & LSP_TRACE_ANY_HIT) != 0;
   if (approximate && (features & LSP_FEATURE_CELLS) != 0) {
 #ifdef LSP_SIMD

@@ -58,8 +58,7 @@ class InstanceBatch {
                 bool counting, lsp_error* error)
       : instances_(instances), options_(options), mask_(mask), counting_(counting), error_(error) {
     // Hits are told apart by their primitives here.
-    if ((options_.flags & LSP_TRACE_OCCLUSION) == 0) return;
-    options_.flags = (options_.flags & ~LSP_TRACE_OCCLUSION) | LSP_TRACE_ANY_HIT;
+    options_.flags = LSP_TRACE_IMPLIED(options.flags) & ~LSP_TRACE_OCCLUSION;
   }
 
   // Traces rays[0, count), at most kBatch.

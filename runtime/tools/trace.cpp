@@ -2,13 +2,13 @@
 #include <algorithm>
 #include <iostream>
 #include <optional>
-#include <thread>
 
 #include <unistd.h>
 
 #include <nlohmann/json.hpp>
 
 #include "lsp/command_line.h"
+#include "lsp/in_chunks.hpp"
 #include "lsp/instanced_scene.hpp"
 #include "lsp/scene_file.hpp"
 #include "lsp/trace_arguments.hpp"
@@ -29,7 +29,7 @@ struct Options {
   std::string device;
   TraceArguments trace;
   uint32_t repeats = 1;
-  uint32_t threads = std::max(1u, std::thread::hardware_concurrency());
+  uint32_t threads = machine_threads();
   CommonOptions common;
 };
 

@@ -1,21 +1,19 @@
 #include "trace_run.h"
 
-#include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cstdio>
 #include <fstream>
 #include <functional>
-#include <thread>
+#include <mutex>
 
 #include "lsp/failures.hpp"
+#include "lsp/in_chunks.hpp"
 #include "resident.h"
 
 namespace lsp {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr size_t kChunkRays = 4096;
 constexpr uint32_t kAllMasks = 0xFF;
 
 double seconds_since(Clock::time_point start) {
@@ -61,35 +59,22 @@ lsp_status trace_part(const TraceTarget& target, const lsp_trace_options& option
   return lsp_trace(target.scene, &options, rays.data(), hits, rays.size(), counts, error);
 }
 
-// All rays once, by request.threads threads that take chunks as they get to them.
+// All rays once, by request.threads threads; `progress` is told how many are done, by one thread at a time.
 void trace_cpu(const TraceTarget& target, const TraceRequest& request, std::span<const LspRay> rays,
                std::span<LspHit> hits, lsp_trace_counts* counts,
                const std::function<void(size_t)>& progress) {
-  const size_t chunks = (rays.size() + kChunkRays - 1) / kChunkRays;
-  const auto threads =
-      static_cast<size_t>(std::clamp<uint64_t>(request.threads, 1, std::max<size_t>(chunks, 1)));
-  std::atomic<size_t> next{0};
-  std::vector<lsp_trace_counts> sums(threads);
-  std::vector<lsp_error> errors(threads);
-  const auto work = [&](size_t me) {
-    for (size_t chunk = next++; chunk < chunks; chunk = next++) {
-      const size_t first = chunk * kChunkRays;
-      const size_t size = std::min(kChunkRays, rays.size() - first);
-      if (trace_part(target, request.options, rays.subspan(first, size), &hits[first],
-                     counts != nullptr ? &sums[me] : nullptr, &errors[me]) != LSP_OK) {
-        return;
-      }
-      if (me == 0) progress(first + size);
-    }
-  };
-  {
-    std::vector<std::jthread> others;
-    for (size_t i = 1; i < threads; ++i) others.emplace_back(work, i);
-    work(0);
-  }
-  for (const lsp_error& error : errors) check(error.status, error);
-  if (counts == nullptr) return;
-  for (const lsp_trace_counts& sum : sums) lsp_add_counts(counts, &sum);
+  std::mutex mutex;  // of what all threads add to
+  size_t done = 0;
+  run_in_chunks(rays.size(), request.threads, [&](size_t first, size_t count) {
+    lsp_trace_counts sum{};
+    lsp_error error{};
+    check(trace_part(target, request.options, rays.subspan(first, count), &hits[first],
+                     counts != nullptr ? &sum : nullptr, &error),
+          error);
+    const std::lock_guard lock(mutex);
+    if (counts != nullptr) lsp_add_counts(counts, &sum);
+    progress(done += count);
+  });
 }
 
 TraceReport trace_on_cpu(const TraceTarget& target, const TraceRequest& request, std::span<const LspRay> rays,

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
 namespace lsp {
 namespace {
@@ -75,15 +76,13 @@ std::vector<VkPhysicalDevice> physical_devices(VkInstance instance) {
 }
 
 VkInstanceCreateInfo instance_info(const VkApplicationInfo* application) {
-  VkInstanceCreateInfo info{};
-  info.sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO;
+  auto info = vk_make<VkInstanceCreateInfo>(VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO);
   info.pApplicationInfo = application;
   return info;
 }
 
 VkApplicationInfo application_info() {
-  VkApplicationInfo info{};
-  info.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO;
+  auto info = vk_make<VkApplicationInfo>(VK_STRUCTURE_TYPE_APPLICATION_INFO);
   info.pApplicationName = "lsp";
   info.apiVersion = kAddressesApiVersion;
   return info;
@@ -152,12 +151,11 @@ void Device::create_instance(const VulkanOptions& options) {
   const VkApplicationInfo application = application_info();
   VkInstanceCreateInfo info = instance_info(&application);
   const VkValidationFeatureEnableEXT enabled = VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT;
-  VkValidationFeaturesEXT features{};
-  features.sType = VK_STRUCTURE_TYPE_VALIDATION_FEATURES_EXT;
+  auto features = vk_make<VkValidationFeaturesEXT>(VK_STRUCTURE_TYPE_VALIDATION_FEATURES_EXT);
   features.enabledValidationFeatureCount = 1;
   features.pEnabledValidationFeatures = &enabled;
-  VkDebugUtilsMessengerCreateInfoEXT messenger{};
-  messenger.sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT;
+  auto messenger =
+      vk_make<VkDebugUtilsMessengerCreateInfoEXT>(VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT);
   messenger.pNext = &features;
   messenger.messageSeverity =
       VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT;
@@ -217,12 +215,11 @@ void Device::create_device(const VulkanOptions& options) {
   limits.max_storage_buffer_range = properties.limits.maxStorageBufferRange;
   limits.max_group_count = properties.limits.maxComputeWorkGroupCount[0];
   // What a device does not know stays zero: no import, no largest buffer.
-  VkPhysicalDeviceExternalMemoryHostPropertiesEXT host{};
-  host.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_EXTERNAL_MEMORY_HOST_PROPERTIES_EXT;
-  VkPhysicalDeviceMaintenance4PropertiesKHR maintenance{};
-  maintenance.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_4_PROPERTIES_KHR;
-  VkPhysicalDeviceProperties2 all{};
-  all.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2;
+  auto host = vk_make<VkPhysicalDeviceExternalMemoryHostPropertiesEXT>(
+      VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_EXTERNAL_MEMORY_HOST_PROPERTIES_EXT);
+  auto maintenance = vk_make<VkPhysicalDeviceMaintenance4PropertiesKHR>(
+      VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_4_PROPERTIES_KHR);
+  auto all = vk_make<VkPhysicalDeviceProperties2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2);
   if (imports) all.pNext = &host;
   if (has_extension(physical, VK_KHR_MAINTENANCE_4_EXTENSION_NAME)) {
     maintenance.pNext = all.pNext;
@@ -234,8 +231,7 @@ void Device::create_device(const VulkanOptions& options) {
   vkGetPhysicalDeviceMemoryProperties(physical, &memory);
 
   const float priority = 1.0f;
-  VkDeviceQueueCreateInfo queue_info{};
-  queue_info.sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO;
+  auto queue_info = vk_make<VkDeviceQueueCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO);
   queue_info.queueFamilyIndex = family_;
   queue_info.queueCount = 1;
   queue_info.pQueuePriorities = &priority;
@@ -246,11 +242,10 @@ void Device::create_device(const VulkanOptions& options) {
   features.robustBufferAccess = available.robustBufferAccess;
   std::vector<const char*> extensions;
   if (imports) extensions.push_back(VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME);
-  VkPhysicalDeviceBufferDeviceAddressFeatures addresses{};
-  addresses.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_BUFFER_DEVICE_ADDRESS_FEATURES;
+  auto addresses = vk_make<VkPhysicalDeviceBufferDeviceAddressFeatures>(
+      VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_BUFFER_DEVICE_ADDRESS_FEATURES);
   if (properties.apiVersion >= kAddressesApiVersion) {
-    VkPhysicalDeviceFeatures2 all{};
-    all.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
+    auto all = vk_make<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2);
     all.pNext = &addresses;
     vkGetPhysicalDeviceFeatures2(physical, &all);
     addresses.bufferDeviceAddressCaptureReplay = VK_FALSE;
@@ -261,8 +256,7 @@ void Device::create_device(const VulkanOptions& options) {
   if (options.addresses && address_uses == 0) {
     unsupported("the device has no buffer addresses");
   }
-  VkDeviceCreateInfo info{};
-  info.sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO;
+  auto info = vk_make<VkDeviceCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO);
   info.queueCreateInfoCount = 1;
   info.pQueueCreateInfos = &queue_info;
   if (address_uses != 0) info.pNext = &addresses;
@@ -276,8 +270,7 @@ void Device::create_device(const VulkanOptions& options) {
     unsupported(error.message);
   vk.vkGetDeviceQueue(handle, family_, 0, &queue);
 
-  VkCommandPoolCreateInfo pool_info{};
-  pool_info.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO;
+  auto pool_info = vk_make<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
   pool_info.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
   pool_info.queueFamilyIndex = family_;
   check(vk.vkCreateCommandPool(handle, &pool_info, nullptr, &pool), "vkCreateCommandPool");
@@ -294,33 +287,65 @@ int Device::memory_type(uint32_t bits, VkMemoryPropertyFlags need, VkMemoryPrope
   return -1;
 }
 
-void Device::submit_and_wait(VkCommandBuffer commands, VkFence fence) {
-  check(vk.vkEndCommandBuffer(commands), "vkEndCommandBuffer");
-  VkSubmitInfo submit{};
-  submit.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO;
+Commands::Commands(Device& device) : device_(device) {
+  try {
+    auto info = vk_make<VkCommandBufferAllocateInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO);
+    info.commandPool = device.pool;
+    info.commandBufferCount = 1;
+    check(device.vk.vkAllocateCommandBuffers(device.handle, &info, &commands_), "vkAllocateCommandBuffers");
+    const auto fence = vk_make<VkFenceCreateInfo>(VK_STRUCTURE_TYPE_FENCE_CREATE_INFO);
+    check(device.vk.vkCreateFence(device.handle, &fence, nullptr, &fence_), "vkCreateFence");
+  } catch (...) {
+    destroy();
+    throw;
+  }
+}
+
+Commands::~Commands() { destroy(); }
+
+void Commands::destroy() noexcept {
+  if (submitted_) device_.vk.vkWaitForFences(device_.handle, 1, &fence_, VK_TRUE, UINT64_MAX);
+  device_.vk.vkDestroyFence(device_.handle, fence_, nullptr);
+  if (commands_ != VK_NULL_HANDLE)
+    device_.vk.vkFreeCommandBuffers(device_.handle, device_.pool, 1, &commands_);
+}
+
+VkCommandBuffer Commands::record() {
+  wait();
+  auto begin = vk_make<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
+  begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
+  check(device_.vk.vkBeginCommandBuffer(commands_, &begin), "vkBeginCommandBuffer");
+  return commands_;
+}
+
+void Commands::submit() {
+  check(device_.vk.vkEndCommandBuffer(commands_), "vkEndCommandBuffer");
+  check(device_.vk.vkResetFences(device_.handle, 1, &fence_), "vkResetFences");
+  auto submit = vk_make<VkSubmitInfo>(VK_STRUCTURE_TYPE_SUBMIT_INFO);
   submit.commandBufferCount = 1;
-  submit.pCommandBuffers = &commands;
-  check(vk.vkResetFences(handle, 1, &fence), "vkResetFences");
-  check(vk.vkQueueSubmit(queue, 1, &submit, fence), "vkQueueSubmit");
-  check(vk.vkWaitForFences(handle, 1, &fence, VK_TRUE, UINT64_MAX), "vkWaitForFences");
+  submit.pCommandBuffers = &commands_;
+  check(device_.vk.vkQueueSubmit(device_.queue, 1, &submit, fence_), "vkQueueSubmit");
+  submitted_ = true;
+}
+
+void Commands::wait() {
+  if (!std::exchange(submitted_, false)) return;
+  check(device_.vk.vkWaitForFences(device_.handle, 1, &fence_, VK_TRUE, UINT64_MAX), "vkWaitForFences");
 }
 
 Buffer::Buffer(Device& device, VkDeviceSize bytes, VkBufferUsageFlags usage, VkMemoryPropertyFlags need,
                VkMemoryPropertyFlags prefer)
     : device_(&device), bytes_(std::max<VkDeviceSize>(bytes, 4)) {
   try {
-    VkBufferCreateInfo info{};
-    info.sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO;
+    auto info = vk_make<VkBufferCreateInfo>(VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO);
     info.size = bytes_;
     info.usage = usage;
     check(device.vk.vkCreateBuffer(device.handle, &info, nullptr, &buffer_), "vkCreateBuffer");
     VkMemoryRequirements requirements;
     device.vk.vkGetBufferMemoryRequirements(device.handle, buffer_, &requirements);
-    VkMemoryAllocateInfo allocation{};
-    allocation.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO;
+    auto allocation = vk_make<VkMemoryAllocateInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO);
     allocation.allocationSize = requirements.size;
-    VkMemoryAllocateFlagsInfo flags{};
-    flags.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO;
+    auto flags = vk_make<VkMemoryAllocateFlagsInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO);
     flags.flags = VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT;
     if ((usage & VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT) != 0) allocation.pNext = &flags;
     VkResult result = VK_ERROR_OUT_OF_DEVICE_MEMORY;
@@ -336,9 +361,7 @@ Buffer::Buffer(Device& device, VkDeviceSize bytes, VkBufferUsageFlags usage, VkM
     check(result, ("vkAllocateMemory of " + std::to_string(requirements.size) + " bytes").c_str());
     check(device.vk.vkBindBufferMemory(device.handle, buffer_, memory_, 0), "vkBindBufferMemory");
     const VkMemoryPropertyFlags got = device.memory.memoryTypes[type].propertyFlags;
-    constexpr VkMemoryPropertyFlags kMappable =
-        VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
-    if (((need | prefer) & kMappable) != 0 && (got & kMappable) == kMappable) {
+    if (((need | prefer) & kHostMemory) != 0 && (got & kHostMemory) == kHostMemory) {
       check(device.vk.vkMapMemory(device.handle, memory_, 0, VK_WHOLE_SIZE, 0, &mapped_), "vkMapMemory");
     }
   } catch (...) {

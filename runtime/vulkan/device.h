@@ -9,6 +9,7 @@
 #include <volk.h>
 
 #include "lsp/program.h"
+#include "lsp/vk_make.hpp"
 #include "lsp/vulkan_device.hpp"
 
 namespace lsp {
@@ -23,6 +24,10 @@ class DeviceLost : public Failure {
 // Throws unless `result` is VK_SUCCESS: DeviceLost, kLimit when memory ran out, kInternal otherwise.
 void check(VkResult result, const char* where);
 
+// Memory that the host writes and reads.
+constexpr VkMemoryPropertyFlags kHostMemory =
+    VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
+
 class Device {
  public:
   explicit Device(const VulkanOptions& options);
@@ -36,9 +41,6 @@ class Device {
   // Index of a memory type out of `bits` that has all of `need`, and all of `prefer` if there is one; -1:
   // none.
   int memory_type(uint32_t bits, VkMemoryPropertyFlags need, VkMemoryPropertyFlags prefer) const;
-
-  // Ends recording, submits and waits.
-  void submit_and_wait(VkCommandBuffer commands, VkFence fence);
 
   VkInstance instance = VK_NULL_HANDLE;
   VkPhysicalDevice physical = VK_NULL_HANDLE;
@@ -66,6 +68,29 @@ class Device {
   void destroy() noexcept;
   VkDebugUtilsMessengerEXT messenger_ = VK_NULL_HANDLE;
   uint32_t family_ = 0;
+};
+
+// A command buffer and the fence that says when the device is done with it.
+class Commands {
+ public:
+  explicit Commands(Device& device);
+  ~Commands();  // waits
+  Commands(const Commands&) = delete;
+  Commands& operator=(const Commands&) = delete;
+
+  // Waits for what was submitted before, and begins anew.
+  VkCommandBuffer record();
+  // What was recorded.
+  void submit();
+  // For what was submitted, if anything was.
+  void wait();
+
+ private:
+  void destroy() noexcept;
+  Device& device_;
+  VkCommandBuffer commands_ = VK_NULL_HANDLE;
+  VkFence fence_ = VK_NULL_HANDLE;
+  bool submitted_ = false;
 };
 
 // A buffer with memory of its own.

@@ -219,8 +219,7 @@ extern "C" lsp_status lsp_vulkan_plan_trace(const lsp_scene* scene, const lsp_vu
                      "LSP_USE_OCCLUSION");
   const bool cells = approximate && header.base_structure == LSP_BASE_CELLS;
   // Flags that have no meaning together make no pipeline of their own.
-  uint32_t flags = options->flags & (LSP_TRACE_ANY_HIT | LSP_TRACE_OCCLUSION);
-  if ((flags & LSP_TRACE_OCCLUSION) != 0) flags |= LSP_TRACE_ANY_HIT;
+  uint32_t flags = LSP_TRACE_IMPLIED(options->flags) & (LSP_TRACE_ANY_HIT | LSP_TRACE_OCCLUSION);
   if (approximate) flags |= LSP_TRACE_APPROXIMATE;
   if (approximate && !cells) {
     const bool near = (options->flags & LSP_TRACE_NEAR_APPROXIMATE) != 0;

@@ -1,8 +1,8 @@
 #include "scene_buffers.h"
 
 #include <algorithm>
-#include <array>
 #include <cstring>
+#include <deque>
 #include <utility>
 
 namespace lsp {
@@ -23,90 +23,45 @@ lsp_vulkan_plan make_plan(const Device& device, const lsp_scene& scene, uint32_t
   return plan;
 }
 
-// Staging memory, its command buffer and the fence that says it may be filled again.
+// Staging memory and the commands that empty it.
 struct Slot {
+  explicit Slot(Device& device)
+      : staging(device, kPieceBytes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, kHostMemory, 0), commands(device) {}
   Buffer staging;
-  VkCommandBuffer commands = VK_NULL_HANDLE;
-  VkFence fence = VK_NULL_HANDLE;
+  Commands commands;  // ends, and with it what it does, before the memory
 };
 
 class Ring {
  public:
   explicit Ring(Device& device) : device_(device) {
-    try {
-      for (Slot& slot : slots_) {
-        slot.staging = Buffer(device, kPieceBytes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
-                              VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT, 0);
-        VkCommandBufferAllocateInfo info{};
-        info.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO;
-        info.commandPool = device.pool;
-        info.commandBufferCount = 1;
-        check(device.vk.vkAllocateCommandBuffers(device.handle, &info, &slot.commands),
-              "vkAllocateCommandBuffers");
-        VkFenceCreateInfo fence{};
-        fence.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO;
-        fence.flags = VK_FENCE_CREATE_SIGNALED_BIT;
-        check(device.vk.vkCreateFence(device.handle, &fence, nullptr, &slot.fence), "vkCreateFence");
-      }
-    } catch (...) {
-      destroy();
-      throw;
-    }
+    for (size_t i = 0; i < kRingSlots; ++i) slots_.emplace_back(device);
   }
-  ~Ring() {
-    device_.vk.vkDeviceWaitIdle(device_.handle);
-    destroy();
-  }
-  Ring(const Ring&) = delete;
-  Ring& operator=(const Ring&) = delete;
 
   void copy(const lsp_vulkan_copy& piece, VkBuffer destination) {
     Slot& slot = slots_[next_++ % kRingSlots];
-    check(device_.vk.vkWaitForFences(device_.handle, 1, &slot.fence, VK_TRUE, UINT64_MAX), "vkWaitForFences");
+    const VkCommandBuffer commands = slot.commands.record();
     memcpy(slot.staging.mapped(), piece.source, piece.bytes);
-    VkCommandBufferBeginInfo begin{};
-    begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
-    begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
-    check(device_.vk.vkBeginCommandBuffer(slot.commands, &begin), "vkBeginCommandBuffer");
-    lsp_vulkan_record_copy(&device_.functions, slot.commands, &piece, slot.staging.handle(), 0, destination);
-    lsp_vulkan_record_upload_barrier(&device_.functions, slot.commands);
-    check(device_.vk.vkEndCommandBuffer(slot.commands), "vkEndCommandBuffer");
-    check(device_.vk.vkResetFences(device_.handle, 1, &slot.fence), "vkResetFences");
-    VkSubmitInfo submit{};
-    submit.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO;
-    submit.commandBufferCount = 1;
-    submit.pCommandBuffers = &slot.commands;
-    check(device_.vk.vkQueueSubmit(device_.queue, 1, &submit, slot.fence), "vkQueueSubmit");
+    lsp_vulkan_record_copy(&device_.functions, commands, &piece, slot.staging.handle(), 0, destination);
+    lsp_vulkan_record_upload_barrier(&device_.functions, commands);
+    slot.commands.submit();
   }
 
   void finish() {
-    for (const Slot& slot : slots_) {
-      check(device_.vk.vkWaitForFences(device_.handle, 1, &slot.fence, VK_TRUE, UINT64_MAX),
-            "vkWaitForFences");
-    }
+    for (Slot& slot : slots_) slot.commands.wait();
   }
 
  private:
-  void destroy() noexcept {
-    for (Slot& slot : slots_) {
-      device_.vk.vkDestroyFence(device_.handle, slot.fence, nullptr);
-      if (slot.commands != VK_NULL_HANDLE) {
-        device_.vk.vkFreeCommandBuffers(device_.handle, device_.pool, 1, &slot.commands);
-      }
-    }
-  }
   Device& device_;
-  std::array<Slot, kRingSlots> slots_;
+  std::deque<Slot> slots_;
   size_t next_ = 0;
 };
 
 // Creates a buffer that may lie in imported host memory.
 VkBuffer create_importable(Device& device, uint64_t bytes, VkBufferUsageFlags usage) {
-  VkExternalMemoryBufferCreateInfo external{};
-  external.sType = VK_STRUCTURE_TYPE_EXTERNAL_MEMORY_BUFFER_CREATE_INFO;
+  auto external =
+      vk_make<VkExternalMemoryBufferCreateInfo>(VK_STRUCTURE_TYPE_EXTERNAL_MEMORY_BUFFER_CREATE_INFO);
   external.handleTypes = kHostPointer;
-  VkBufferCreateInfo info{};
-  info.sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO;
+  auto info = vk_make<VkBufferCreateInfo>(VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO);
   info.pNext = &external;
   info.size = bytes;
   info.usage = usage;
@@ -116,12 +71,11 @@ VkBuffer create_importable(Device& device, uint64_t bytes, VkBufferUsageFlags us
 }
 
 void check_importable(const Device& device) {
-  VkPhysicalDeviceExternalBufferInfo info{};
-  info.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_EXTERNAL_BUFFER_INFO;
+  auto info =
+      vk_make<VkPhysicalDeviceExternalBufferInfo>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_EXTERNAL_BUFFER_INFO);
   info.usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
   info.handleType = kHostPointer;
-  VkExternalBufferProperties properties{};
-  properties.sType = VK_STRUCTURE_TYPE_EXTERNAL_BUFFER_PROPERTIES;
+  auto properties = vk_make<VkExternalBufferProperties>(VK_STRUCTURE_TYPE_EXTERNAL_BUFFER_PROPERTIES);
   vkGetPhysicalDeviceExternalBufferProperties(device.physical, &info, &properties);
   if ((properties.externalMemoryProperties.externalMemoryFeatures &
        VK_EXTERNAL_MEMORY_FEATURE_IMPORTABLE_BIT) == 0) {
@@ -157,8 +111,8 @@ SceneBuffers SceneBuffers::import_mapping(Device& device, const lsp_scene& scene
   if (lsp_vulkan_check_import(&scene, &device.limits, &error) != LSP_OK) refuse(error.message);
   check_importable(device);
 
-  VkMemoryHostPointerPropertiesEXT pointer{};
-  pointer.sType = VK_STRUCTURE_TYPE_MEMORY_HOST_POINTER_PROPERTIES_EXT;
+  auto pointer =
+      vk_make<VkMemoryHostPointerPropertiesEXT>(VK_STRUCTURE_TYPE_MEMORY_HOST_POINTER_PROPERTIES_EXT);
   if (device.vk.vkGetMemoryHostPointerPropertiesEXT(device.handle, kHostPointer, scene.bytes, &pointer) !=
       VK_SUCCESS) {
     refuse("the device cannot import this memory");
@@ -179,16 +133,14 @@ SceneBuffers SceneBuffers::import_mapping(Device& device, const lsp_scene& scene
   const int type = device.memory_type(types, 0, VK_MEMORY_PROPERTY_HOST_CACHED_BIT);
   if (type < 0) refuse("no memory type of the device fits both the mapping and a storage buffer");
 
-  VkImportMemoryHostPointerInfoEXT import{};
-  import.sType = VK_STRUCTURE_TYPE_IMPORT_MEMORY_HOST_POINTER_INFO_EXT;
+  auto import =
+      vk_make<VkImportMemoryHostPointerInfoEXT>(VK_STRUCTURE_TYPE_IMPORT_MEMORY_HOST_POINTER_INFO_EXT);
   import.handleType = kHostPointer;
   import.pHostPointer = const_cast<void*>(scene.bytes);  // the shaders' buffers are read-only
-  VkMemoryAllocateFlagsInfo flags{};
-  flags.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO;
+  auto flags = vk_make<VkMemoryAllocateFlagsInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO);
   flags.flags = VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT;
   if (result.plan_.addresses != 0) import.pNext = &flags;
-  VkMemoryAllocateInfo allocation{};
-  allocation.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO;
+  auto allocation = vk_make<VkMemoryAllocateInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO);
   allocation.pNext = &import;
   allocation.allocationSize = scene.size;
   allocation.memoryTypeIndex = static_cast<uint32_t>(type);
@@ -210,10 +162,8 @@ SceneBuffers SceneBuffers::upload(Device& device, const lsp_scene& scene, uint32
   result.plan_ = make_plan(device, scene, uses);
   bool mapped = true;
   for (uint32_t i = 0; i < result.plan_.buffer_count; ++i) {
-    constexpr VkMemoryPropertyFlags kHost =
-        VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
     result.owned_.emplace_back(device, result.plan_.buffers[i].bytes, result.plan_.usage,
-                               VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT, staging ? 0 : kHost);
+                               VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT, staging ? 0 : kHostMemory);
     result.handles_[i] = result.owned_.back().handle();
     mapped = mapped && result.owned_.back().mapped() != nullptr;
   }
@@ -230,15 +180,13 @@ SceneBuffers SceneBuffers::upload(Device& device, const lsp_scene& scene, uint32
 void SceneBuffers::write_addresses() {
   if (plan_.addresses == 0) return;
   for (uint32_t i = 0; i < plan_.buffer_count; ++i) {
-    VkBufferDeviceAddressInfo info{};
-    info.sType = VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO;
+    auto info = vk_make<VkBufferDeviceAddressInfo>(VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO);
     info.buffer = handles_[i];
     buffer_addresses_[i] = device_->vk.vkGetBufferDeviceAddress(device_->handle, &info);
   }
   VkDeviceAddress table[LSP_VULKAN_ADDRESS_COUNT];
   lsp_vulkan_address_table(&plan_, buffer_addresses_, table);
-  addresses_ = Buffer(*device_, sizeof table, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT,
-                      VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT, 0);
+  addresses_ = Buffer(*device_, sizeof table, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, kHostMemory, 0);
   memcpy(addresses_.mapped(), table, sizeof table);
 }
 

@@ -3,75 +3,24 @@
 
 namespace {
 
-constexpr uint32_t kBvh[] =
-#include "trace.spv.inc"
-    ;
-constexpr uint32_t kBvhCount[] =
-#include "trace_count.spv.inc"
-    ;
-constexpr uint32_t kBvhAddresses[] =
-#include "trace_addresses.spv.inc"
-    ;
-constexpr uint32_t kBvhAddressesCount[] =
-#include "trace_addresses_count.spv.inc"
-    ;
-constexpr uint32_t kNTree[] =
-#include "trace_ntree.spv.inc"
-    ;
-constexpr uint32_t kNTreeCount[] =
-#include "trace_ntree_count.spv.inc"
-    ;
-constexpr uint32_t kNTreeAddresses[] =
-#include "trace_ntree_addresses.spv.inc"
-    ;
-constexpr uint32_t kNTreeAddressesCount[] =
-#include "trace_ntree_addresses_count.spv.inc"
-    ;
-constexpr uint32_t kCells[] =
-#include "trace_cells.spv.inc"
-    ;
-constexpr uint32_t kCellsCount[] =
-#include "trace_cells_count.spv.inc"
-    ;
-constexpr uint32_t kCellsAddresses[] =
-#include "trace_cells_addresses.spv.inc"
-    ;
-constexpr uint32_t kCellsAddressesCount[] =
-#include "trace_cells_addresses_count.spv.inc"
-    ;
-constexpr uint32_t kWide[] =
-#include "trace_wide.spv.inc"
-    ;
-constexpr uint32_t kWideCount[] =
-#include "trace_wide_count.spv.inc"
-    ;
-constexpr uint32_t kWideAddresses[] =
-#include "trace_wide_addresses.spv.inc"
-    ;
-constexpr uint32_t kWideAddressesCount[] =
-#include "trace_wide_addresses_count.spv.inc"
-    ;
-constexpr uint32_t kInstances[] =
-#include "trace_instances.spv.inc"
-    ;
-constexpr uint32_t kInstancesCount[] =
-#include "trace_instances_count.spv.inc"
-    ;
+#include "shaders.inc"
 
 struct Spirv {
   const uint32_t* words;
   size_t bytes;
 };
+
+// What counts, and what does not.
+#define LSP_SPIRV(name)                                        \
+  {                                                            \
+    {name, sizeof name}, { name##_count, sizeof name##_count } \
+  }
 // By base structure, addresses, counting.
-constexpr Spirv kShaders[4][2][2] = {
-    {{{kBvh, sizeof kBvh}, {kBvhCount, sizeof kBvhCount}},
-     {{kBvhAddresses, sizeof kBvhAddresses}, {kBvhAddressesCount, sizeof kBvhAddressesCount}}},
-    {{{kNTree, sizeof kNTree}, {kNTreeCount, sizeof kNTreeCount}},
-     {{kNTreeAddresses, sizeof kNTreeAddresses}, {kNTreeAddressesCount, sizeof kNTreeAddressesCount}}},
-    {{{kCells, sizeof kCells}, {kCellsCount, sizeof kCellsCount}},
-     {{kCellsAddresses, sizeof kCellsAddresses}, {kCellsAddressesCount, sizeof kCellsAddressesCount}}},
-    {{{kWide, sizeof kWide}, {kWideCount, sizeof kWideCount}},
-     {{kWideAddresses, sizeof kWideAddresses}, {kWideAddressesCount, sizeof kWideAddressesCount}}}};
+constexpr Spirv kShaders[4][2][2] = {{LSP_SPIRV(trace), LSP_SPIRV(trace_addresses)},
+                                     {LSP_SPIRV(trace_ntree), LSP_SPIRV(trace_ntree_addresses)},
+                                     {LSP_SPIRV(trace_cells), LSP_SPIRV(trace_cells_addresses)},
+                                     {LSP_SPIRV(trace_wide), LSP_SPIRV(trace_wide_addresses)}};
+constexpr Spirv kInstances[2] = LSP_SPIRV(trace_instances);
 
 }  // namespace
 
@@ -83,6 +32,7 @@ extern "C" const uint32_t* lsp_vulkan_trace_spirv(const lsp_vulkan_plan* plan, i
 }
 
 extern "C" const uint32_t* lsp_vulkan_instances_spirv(int counting, size_t* bytes) {
-  *bytes = counting != 0 ? sizeof kInstancesCount : sizeof kInstances;
-  return counting != 0 ? kInstancesCount : kInstances;
+  const Spirv& shader = kInstances[counting != 0];
+  *bytes = shader.bytes;
+  return shader.words;
 }

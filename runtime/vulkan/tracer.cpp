@@ -1,169 +1,25 @@
 #include <algorithm>
 #include <chrono>
-#include <cstddef>
 #include <cstring>
-#include <functional>
 #include <map>
 #include <memory>
 #include <tuple>
 
-#include "device.h"
 #include "lsp/instances.hpp"
+#include "ray_batches.h"
 #include "scene_buffers.h"
+#include "trace_shader.h"
 
 namespace lsp {
 namespace {
-
-constexpr uint32_t kBatchRays = 1u << 20;
-constexpr VkMemoryPropertyFlags kHost =
-    VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
-
-// The counting shader adds to the counts as to 64-bit words.
-constexpr bool is_counter(size_t offset, uint32_t number) { return offset == number * sizeof(uint64_t); }
-static_assert(is_counter(offsetof(lsp_trace_counts, invalid), LSP_COUNTER_INVALID));
-static_assert(is_counter(offsetof(lsp_trace_counts, hits), LSP_COUNTER_HITS));
-static_assert(is_counter(offsetof(lsp_trace_counts, nodes), LSP_COUNTER_NODES));
-static_assert(is_counter(offsetof(lsp_trace_counts, shafts), LSP_COUNTER_SHAFTS));
-static_assert(is_counter(offsetof(lsp_trace_counts, triangles), LSP_COUNTER_TRIANGLES));
-static_assert(is_counter(offsetof(lsp_trace_counts, splits), LSP_COUNTER_SPLITS));
-static_assert(is_counter(offsetof(lsp_trace_counts, exact), LSP_COUNTER_EXACT));
-static_assert(is_counter(offsetof(lsp_trace_counts, exact_nodes), LSP_COUNTER_EXACT_NODES));
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-void record_barrier(Device& device, VkCommandBuffer commands, VkPipelineStageFlags from,
-                    VkAccessFlags written, VkPipelineStageFlags to, VkAccessFlags read) {
-  VkMemoryBarrier barrier{};
-  barrier.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;
-  barrier.srcAccessMask = written;
-  barrier.dstAccessMask = read;
-  device.vk.vkCmdPipelineBarrier(commands, from, to, 0, 1, &barrier, 0, nullptr, 0, nullptr);
+void check_sizes(std::span<const LspRay> rays, std::span<LspHit> hits) {
+  if (hits.size() != rays.size()) throw Failure(Exit::kInternal, "", "as many hits as rays are needed");
 }
-
-// Everything of the trace shader that lasts as long as the device: layouts, descriptor set, commands, timer.
-class Shader {
- public:
-  explicit Shader(Device& device) : device_(device) {
-    try {
-      create();
-    } catch (...) {
-      destroy();
-      throw;
-    }
-  }
-  ~Shader() { destroy(); }
-  Shader(const Shader&) = delete;
-  Shader& operator=(const Shader&) = delete;
-
-  // A pipeline of this SPIR-V for traces with `flags`, whose stack has `stack` entries and which needs these
-  // parts of the shader. The caller destroys it.
-  VkPipeline create_pipeline(const uint32_t* words, size_t bytes, uint32_t flags, uint32_t stack,
-                             uint32_t parts) {
-    VkShaderModuleCreateInfo module_info{};
-    module_info.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
-    module_info.pCode = words;
-    module_info.codeSize = bytes;
-    VkShaderModule module = VK_NULL_HANDLE;
-    check(device_.vk.vkCreateShaderModule(device_.handle, &module_info, nullptr, &module),
-          "vkCreateShaderModule");
-    const uint32_t values[] = {stack, flags, parts};
-    const VkSpecializationMapEntry entries[] = {
-        {LSP_VULKAN_STACK_CONSTANT, 0, sizeof(uint32_t)},
-        {LSP_VULKAN_FLAGS_CONSTANT, sizeof(uint32_t), sizeof(uint32_t)},
-        {LSP_VULKAN_PARTS_CONSTANT, 2 * sizeof(uint32_t), sizeof(uint32_t)}};
-    const VkSpecializationInfo specialization{3, entries, sizeof values, values};
-    VkComputePipelineCreateInfo info{};
-    info.sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO;
-    info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
-    info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
-    info.stage.module = module;
-    info.stage.pName = "main";
-    info.stage.pSpecializationInfo = &specialization;
-    info.layout = layout;
-    VkPipeline pipeline = VK_NULL_HANDLE;
-    const VkResult result =
-        device_.vk.vkCreateComputePipelines(device_.handle, VK_NULL_HANDLE, 1, &info, nullptr, &pipeline);
-    device_.vk.vkDestroyShaderModule(device_.handle, module, nullptr);
-    check(result, "vkCreateComputePipelines");
-    return pipeline;
-  }
-
-  VkPipelineLayout layout = VK_NULL_HANDLE;
-  VkDescriptorSet set = VK_NULL_HANDLE;
-  VkCommandBuffer commands = VK_NULL_HANDLE;
-  VkFence fence = VK_NULL_HANDLE;
-  VkQueryPool timer = VK_NULL_HANDLE;  // null where the device has no timestamps
-
- private:
-  void create() {
-    VkDescriptorSetLayoutBinding bindings[LSP_BINDING_COUNT];
-    lsp_vulkan_layout_bindings(bindings);
-    VkDescriptorSetLayoutCreateInfo set_info{};
-    set_info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO;
-    set_info.bindingCount = LSP_BINDING_COUNT;
-    set_info.pBindings = bindings;
-    check(device_.vk.vkCreateDescriptorSetLayout(device_.handle, &set_info, nullptr, &set_layout_),
-          "vkCreateDescriptorSetLayout");
-    const VkPushConstantRange push{VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof(lsp_vulkan_trace_constants)};
-    VkPipelineLayoutCreateInfo layout_info{};
-    layout_info.sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO;
-    layout_info.setLayoutCount = 1;
-    layout_info.pSetLayouts = &set_layout_;
-    layout_info.pushConstantRangeCount = 1;
-    layout_info.pPushConstantRanges = &push;
-    check(device_.vk.vkCreatePipelineLayout(device_.handle, &layout_info, nullptr, &layout),
-          "vkCreatePipelineLayout");
-
-    const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, LSP_BINDING_COUNT};
-    VkDescriptorPoolCreateInfo pool_info{};
-    pool_info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO;
-    pool_info.maxSets = 1;
-    pool_info.poolSizeCount = 1;
-    pool_info.pPoolSizes = &size;
-    check(device_.vk.vkCreateDescriptorPool(device_.handle, &pool_info, nullptr, &pool_),
-          "vkCreateDescriptorPool");
-    VkDescriptorSetAllocateInfo set_allocation{};
-    set_allocation.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO;
-    set_allocation.descriptorPool = pool_;
-    set_allocation.descriptorSetCount = 1;
-    set_allocation.pSetLayouts = &set_layout_;
-    check(device_.vk.vkAllocateDescriptorSets(device_.handle, &set_allocation, &set),
-          "vkAllocateDescriptorSets");
-
-    VkCommandBufferAllocateInfo commands_info{};
-    commands_info.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO;
-    commands_info.commandPool = device_.pool;
-    commands_info.commandBufferCount = 1;
-    check(device_.vk.vkAllocateCommandBuffers(device_.handle, &commands_info, &commands),
-          "vkAllocateCommandBuffers");
-    VkFenceCreateInfo fence_info{};
-    fence_info.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO;
-    check(device_.vk.vkCreateFence(device_.handle, &fence_info, nullptr, &fence), "vkCreateFence");
-    if (device_.seconds_per_tick > 0) {
-      VkQueryPoolCreateInfo timer_info{};
-      timer_info.sType = VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO;
-      timer_info.queryType = VK_QUERY_TYPE_TIMESTAMP;
-      timer_info.queryCount = 2;
-      check(device_.vk.vkCreateQueryPool(device_.handle, &timer_info, nullptr, &timer), "vkCreateQueryPool");
-    }
-  }
-
-  void destroy() noexcept {
-    device_.vk.vkDestroyQueryPool(device_.handle, timer, nullptr);
-    device_.vk.vkDestroyFence(device_.handle, fence, nullptr);
-    if (commands != VK_NULL_HANDLE)
-      device_.vk.vkFreeCommandBuffers(device_.handle, device_.pool, 1, &commands);
-    device_.vk.vkDestroyDescriptorPool(device_.handle, pool_, nullptr);
-    device_.vk.vkDestroyPipelineLayout(device_.handle, layout, nullptr);
-    device_.vk.vkDestroyDescriptorSetLayout(device_.handle, set_layout_, nullptr);
-  }
-
-  Device& device_;
-  VkDescriptorSetLayout set_layout_ = VK_NULL_HANDLE;
-  VkDescriptorPool pool_ = VK_NULL_HANDLE;
-};
 
 // The kind of trace of instances of these assets. Throws Failure(kUnsupported), by the asset's number.
 lsp_vulkan_kind plan_instances(std::span<const lsp_scene* const> scenes,
@@ -180,7 +36,7 @@ lsp_vulkan_kind plan_instances(std::span<const lsp_scene* const> scenes,
 // Scenes of one kind share them: the stack is that of the scene that needs the largest.
 class Pipelines {
  public:
-  Pipelines(Device& device, Shader& shader, uint32_t stack)
+  Pipelines(Device& device, TraceShader& shader, uint32_t stack)
       : device_(device), shader_(shader), stack_(stack) {}
   ~Pipelines() {
     for (const auto& [key, pipeline] : made_) device_.vk.vkDestroyPipeline(device_.handle, pipeline, nullptr);
@@ -193,22 +49,27 @@ class Pipelines {
     if (pipeline != VK_NULL_HANDLE) return pipeline;
     size_t bytes = 0;
     const uint32_t* words = lsp_vulkan_trace_spirv(&plan, counting ? 1 : 0, &bytes);
-    return pipeline = shader_.create_pipeline(words, bytes, kind.flags, stack_, kind.parts);
+    return pipeline = create(words, bytes, kind);
   }
   // The same of instances, whose assets need these parts of the shader.
-  VkPipeline get_instances(bool counting, uint32_t flags, uint32_t parts) {
-    VkPipeline& pipeline = made_[{kInstances, 1, counting, flags, parts}];
+  VkPipeline get_instances(bool counting, const lsp_vulkan_kind& kind) {
+    VkPipeline& pipeline = made_[{kInstances, 1, counting, kind.flags, kind.parts}];
     if (pipeline != VK_NULL_HANDLE) return pipeline;
     size_t bytes = 0;
     const uint32_t* words = lsp_vulkan_instances_spirv(counting ? 1 : 0, &bytes);
-    return pipeline = shader_.create_pipeline(words, bytes, flags, stack_, parts);
+    return pipeline = create(words, bytes, kind);
   }
 
  private:
   static constexpr uint32_t kInstances = 0;  // no base structure's number
 
+  VkPipeline create(const uint32_t* words, size_t bytes, lsp_vulkan_kind kind) {
+    kind.stack = stack_;
+    return shader_.create_pipeline(words, bytes, kind);
+  }
+
   Device& device_;
-  Shader& shader_;
+  TraceShader& shader_;
   uint32_t stack_;
   std::map<std::tuple<uint32_t, uint32_t, bool, uint32_t, uint32_t>, VkPipeline> made_;
 };
@@ -218,32 +79,6 @@ struct Loaded {
   lsp_scene scene{};
   SceneBuffers buffers;
   bool imported = false;
-};
-
-// Rays and hits of one batch. Where device and host share memory the shader works on what the host writes; on
-// a discrete device it works on memory of its own, filled and emptied by transfers.
-struct BatchBuffers {
-  Buffer rays;
-  Buffer hits;
-  Buffer device_rays;  // discrete devices only
-  Buffer device_hits;
-  uint32_t capacity = 0;
-
-  BatchBuffers() = default;
-  BatchBuffers(Device& device, uint32_t count) : capacity(count) {
-    const VkDeviceSize bytes = VkDeviceSize{count} * sizeof(LspRay);
-    constexpr VkBufferUsageFlags kStorage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
-    constexpr VkBufferUsageFlags kFrom = VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
-    constexpr VkBufferUsageFlags kTo = VK_BUFFER_USAGE_TRANSFER_DST_BIT;
-    rays = Buffer(device, bytes, kStorage | kFrom, kHost, 0);
-    hits = Buffer(device, bytes, kStorage | kTo, kHost, VK_MEMORY_PROPERTY_HOST_CACHED_BIT);
-    if (device.shares_memory) return;
-    device_rays = Buffer(device, bytes, kStorage | kTo, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT, 0);
-    device_hits = Buffer(device, bytes, kStorage | kFrom, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT, 0);
-  }
-  bool staged() const { return device_rays.handle() != VK_NULL_HANDLE; }
-  VkBuffer shader_rays() const { return staged() ? device_rays.handle() : rays.handle(); }
-  VkBuffer shader_hits() const { return staged() ? device_hits.handle() : hits.handle(); }
 };
 
 }  // namespace
@@ -293,25 +128,15 @@ class VulkanTracer::Impl {
   lsp_trace_options options_for(uint32_t use) const;
   lsp_trace_options as_loaded(lsp_trace_options options) const;
   void put_instances(const lsp_instances& instances, const lsp_trace_options& options);
-  // Records the dispatch that traces so many rays; its pipeline and set are ready.
-  using Record = std::function<void(VkCommandBuffer, uint32_t count)>;
-  // Traces one ray on the CPU, which adds to the counts unless they are null.
-  using Retrace = std::function<lsp_status(const LspRay&, LspHit&, lsp_trace_counts*, lsp_error*)>;
-  void begin_trace(std::span<const LspRay> rays, std::span<LspHit> hits);
-  uint32_t batch_rays() const { return std::min(lsp_vulkan_max_rays(&device->limits), kBatchRays); }
-  VulkanTrace trace_batches(const Record& record, const Retrace& retrace, std::span<const LspRay> rays,
-                            std::span<LspHit> hits, bool counting);
-  double trace_batch(const Record& record, const LspRay* rays, LspHit* hits, uint32_t count, bool counting);
-  void record_batch(const Record& record, uint32_t count);
 
   VulkanOptions options_;
   uint32_t uses_ = 0;
   bool instanced_ = false;  // the scenes are assets of instances
   std::string name_;        // of the scene that is being loaded, before what is wrong with it
-  std::unique_ptr<Shader> shader_;
+  std::unique_ptr<RayBatches> batches_;
+  std::unique_ptr<TraceShader> shader_;
+  VkDescriptorSet set_ = VK_NULL_HANDLE;
   std::unique_ptr<Pipelines> pipelines_;
-  Buffer counters_;
-  BatchBuffers batch_;
   Buffer assets_;     // an lsp_vulkan_asset for each that is loaded
   Buffer instances_;  // as lsp_instances_build has filled it
   VkDeviceSize instances_capacity_ = 0;
@@ -320,17 +145,17 @@ class VulkanTracer::Impl {
 void VulkanTracer::Impl::open() {
   device = std::make_unique<Device>(options_);
   device_name = device->properties.deviceName;
-  shader_ = std::make_unique<Shader>(*device);
-  counters_ = Buffer(*device, sizeof(lsp_trace_counts), VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, kHost, 0);
+  batches_ = std::make_unique<RayBatches>(*device);
+  shader_ = std::make_unique<TraceShader>(*device, 1);
+  set_ = shader_->allocate_set();
 }
 
 void VulkanTracer::Impl::close() noexcept {
   unload();
   instances_ = {};
   instances_capacity_ = 0;
-  batch_ = {};
-  counters_ = {};
   shader_.reset();
+  batches_.reset();
   device.reset();
 }
 
@@ -475,120 +300,34 @@ void VulkanTracer::Impl::load(std::span<const lsp_scene* const> scenes, uint32_t
   load_seconds = seconds_since(start);
 }
 
-void VulkanTracer::Impl::record_batch(const Record& record, uint32_t count) {
-  constexpr VkPipelineStageFlagBits kCompute = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT;
-  constexpr VkPipelineStageFlags kTransfer = VK_PIPELINE_STAGE_TRANSFER_BIT;
-  const auto& vk = device->vk;
-  const VkCommandBuffer commands = shader_->commands;
-  const VkBufferCopy all{0, 0, VkDeviceSize{count} * sizeof(LspRay)};
-  VkCommandBufferBeginInfo begin{};
-  begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
-  begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
-  check(vk.vkBeginCommandBuffer(commands, &begin), "vkBeginCommandBuffer");
-  if (batch_.staged()) {
-    vk.vkCmdCopyBuffer(commands, batch_.rays.handle(), batch_.device_rays.handle(), 1, &all);
-    record_barrier(*device, commands, kTransfer, VK_ACCESS_TRANSFER_WRITE_BIT, kCompute,
-                   VK_ACCESS_SHADER_READ_BIT);
-  }
-  if (shader_->timer != VK_NULL_HANDLE) {
-    vk.vkCmdResetQueryPool(commands, shader_->timer, 0, 2);
-    vk.vkCmdWriteTimestamp(commands, kCompute, shader_->timer, 0);
-  }
-  record(commands, count);
-  if (shader_->timer != VK_NULL_HANDLE) vk.vkCmdWriteTimestamp(commands, kCompute, shader_->timer, 1);
-  if (batch_.staged()) {
-    record_barrier(*device, commands, kCompute, VK_ACCESS_SHADER_WRITE_BIT, kTransfer,
-                   VK_ACCESS_TRANSFER_READ_BIT);
-    vk.vkCmdCopyBuffer(commands, batch_.device_hits.handle(), batch_.hits.handle(), 1, &all);
-  }
-  record_barrier(*device, commands, kCompute | kTransfer,
-                 VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_WRITE_BIT, VK_PIPELINE_STAGE_HOST_BIT,
-                 VK_ACCESS_HOST_READ_BIT);
-}
-
-// Returns the seconds in the shader.
-double VulkanTracer::Impl::trace_batch(const Record& record, const LspRay* rays, LspHit* hits, uint32_t count,
-                                       bool counting) {
-  memcpy(batch_.rays.mapped(), rays, size_t{count} * sizeof(LspRay));
-  if (counting) memset(counters_.mapped(), 0, sizeof(lsp_trace_counts));
-  record_batch(record, count);
-  device->submit_and_wait(shader_->commands, shader_->fence);
-  memcpy(hits, batch_.hits.mapped(), size_t{count} * sizeof(LspHit));
-  if (shader_->timer == VK_NULL_HANDLE) return 0;
-  uint64_t ticks[2] = {};
-  check(device->vk.vkGetQueryPoolResults(device->handle, shader_->timer, 0, 2, sizeof ticks, ticks,
-                                         sizeof ticks[0], VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT),
-        "vkGetQueryPoolResults");
-  return static_cast<double>(ticks[1] - ticks[0]) * device->seconds_per_tick;
-}
-
-// Makes room for rays and hits.
-void VulkanTracer::Impl::begin_trace(std::span<const LspRay> rays, std::span<LspHit> hits) {
-  if (hits.size() != rays.size()) throw Failure(Exit::kInternal, "", "as many hits as rays are needed");
-  const auto capacity = static_cast<uint32_t>(std::min<size_t>(rays.size(), batch_rays()));
-  if (capacity <= batch_.capacity) return;
-  batch_ = {};  // before the new ones are made, not after
-  batch_ = BatchBuffers(*device, capacity);
-}
-
-VulkanTrace VulkanTracer::Impl::trace_batches(const Record& record, const Retrace& retrace,
-                                              std::span<const LspRay> rays, std::span<LspHit> hits,
-                                              bool counting) {
-  VulkanTrace result;
-  const uint32_t most = batch_rays();
-  for (size_t first = 0; first < rays.size(); first += most) {
-    const auto size = static_cast<uint32_t>(std::min<size_t>(rays.size() - first, most));
-    result.gpu_seconds += trace_batch(record, &rays[first], &hits[first], size, counting);
-    if (counting) {
-      lsp_trace_counts counts;
-      memcpy(&counts, counters_.mapped(), sizeof counts);
-      lsp_add_counts(&result.counts, &counts);
-    }
-    ++result.batches;
-  }
-  for (size_t i = 0; i < hits.size(); ++i) {
-    if ((hits[i].flags & LSP_HIT_INCOMPLETE) == 0) continue;
-    lsp_trace_counts counts{};
-    lsp_error error;
-    const lsp_status status = retrace(rays[i], hits[i], counting ? &counts : nullptr, &error);
-    if (status != LSP_OK) throw Failure(static_cast<Exit>(status), "", error.message);
-    ++result.retraced;
-    lsp_add_counts(&result.counts, &counts);
-  }
-  result.counts.rays = rays.size();  // those retraced are not counted twice
-  return result;
-}
-
 VulkanTrace VulkanTracer::Impl::trace(const lsp_trace_options& options, std::span<const LspRay> rays,
                                       std::span<LspHit> hits, bool count, size_t number) {
   if (number >= loaded.size())
     throw Failure(Exit::kUnsupported, "", "the scene is not loaded for this kind of trace");
   const auto start = std::chrono::steady_clock::now();
-  begin_trace(rays, hits);
+  batches_->reserve(rays.size());
   const Loaded& scene = loaded[number];
   lsp_vulkan_kind kind;
   lsp_error error;
   const lsp_status status =
       lsp_vulkan_plan_trace(&scene.scene, &scene.buffers.plan(), &options, &kind, &error);
   if (status != LSP_OK) throw Failure(static_cast<Exit>(status), "", error.message);
-  lsp_vulkan_write_descriptors(&device->functions, device->handle, shader_->set, &scene.buffers.plan(),
-                               scene.buffers.handles(), batch_.shader_rays(), batch_.shader_hits(),
-                               counters_.handle());
+  lsp_vulkan_write_descriptors(&device->functions, device->handle, set_, &scene.buffers.plan(),
+                               scene.buffers.handles(), batches_->rays(), batches_->hits(),
+                               batches_->counters());
   if (scene.buffers.plan().addresses != 0) {
-    lsp_vulkan_write_address_table(&device->functions, device->handle, shader_->set,
-                                   scene.buffers.addresses());
+    lsp_vulkan_write_address_table(&device->functions, device->handle, set_, scene.buffers.addresses());
   }
   const VkPipeline pipeline = pipelines_->get(scene.buffers.plan(), count, kind);
   const auto record = [&](VkCommandBuffer commands, uint32_t size) {
     const lsp_vulkan_trace_constants constants{options.lod, 0, size, kind.dial};
-    lsp_vulkan_record_trace(&device->functions, commands, pipeline, shader_->layout, shader_->set,
-                            &constants);
+    lsp_vulkan_record_trace(&device->functions, commands, pipeline, shader_->layout(), set_, &constants);
   };
   const lsp_trace_options again = as_loaded(options);
   const auto retrace = [&](const LspRay& ray, LspHit& hit, lsp_trace_counts* counts, lsp_error* error) {
     return lsp_trace(&scene.scene, &again, &ray, &hit, 1, counts, error);
   };
-  VulkanTrace result = trace_batches(record, retrace, rays, hits, count);
+  VulkanTrace result = batches_->trace(record, retrace, rays, hits, count);
   result.seconds = seconds_since(start);
   return result;
 }
@@ -607,7 +346,7 @@ void VulkanTracer::Impl::put_instances(const lsp_instances& instances, const lsp
   }
   const size_t bytes = described.size() * sizeof described[0];
   if (assets_.handle() == VK_NULL_HANDLE)
-    assets_ = Buffer(*device, bytes, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, kHost, kNear);
+    assets_ = Buffer(*device, bytes, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, kHostMemory, kNear);
   memcpy(assets_.mapped(), described.data(), bytes);
   const VkDeviceSize size = lsp_instances_bytes(instances.count);
   if (size > device->limits.max_storage_buffer_range)
@@ -617,8 +356,8 @@ void VulkanTracer::Impl::put_instances(const lsp_instances& instances, const lsp
                       std::to_string(device->limits.max_storage_buffer_range) + "; trace them on the CPU");
   if (size > instances_capacity_ || instances_.handle() == VK_NULL_HANDLE) {
     instances_ = {};
-    instances_ =
-        Buffer(*device, std::max<VkDeviceSize>(size, 16), VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, kHost, kNear);
+    instances_ = Buffer(*device, std::max<VkDeviceSize>(size, 16), VK_BUFFER_USAGE_STORAGE_BUFFER_BIT,
+                        kHostMemory, kNear);
     instances_capacity_ = size;
   }
   if (size > 0) memcpy(instances_.mapped(), instances.records, size);
@@ -638,22 +377,21 @@ VulkanTrace VulkanTracer::Impl::trace_instances(const lsp_instances& instances,
     plans.push_back(asset.buffers.plan());
   }
   const lsp_vulkan_kind kind = plan_instances(scenes, plans, wanted);
-  begin_trace(rays, hits);
+  batches_->reserve(rays.size());
   put_instances(instances, wanted);
-  lsp_vulkan_write_instance_descriptors(&device->functions, device->handle, shader_->set, assets_.handle(),
-                                        instances_.handle(), batch_.shader_rays(), batch_.shader_hits(),
-                                        counters_.handle());
-  const VkPipeline pipeline = pipelines_->get_instances(count, kind.flags, kind.parts);
+  lsp_vulkan_write_instance_descriptors(&device->functions, device->handle, set_, assets_.handle(),
+                                        instances_.handle(), batches_->rays(), batches_->hits(),
+                                        batches_->counters());
+  const VkPipeline pipeline = pipelines_->get_instances(count, kind);
   const auto record = [&](VkCommandBuffer commands, uint32_t size) {
     const lsp_vulkan_instance_constants constants{instances.count, 0, size, mask};
-    lsp_vulkan_record_instances(&device->functions, commands, pipeline, shader_->layout, shader_->set,
-                                &constants);
+    lsp_vulkan_record_instances(&device->functions, commands, pipeline, shader_->layout(), set_, &constants);
   };
   const lsp_trace_options again = as_loaded(wanted);
   const auto retrace = [&](const LspRay& ray, LspHit& hit, lsp_trace_counts* counts, lsp_error* error) {
     return lsp_trace_instances(&instances, &again, mask, &ray, &hit, 1, counts, error);
   };
-  VulkanTrace result = trace_batches(record, retrace, rays, hits, count);
+  VulkanTrace result = batches_->trace(record, retrace, rays, hits, count);
   result.seconds = seconds_since(start);
   return result;
 }
@@ -676,12 +414,14 @@ void VulkanTracer::load(std::span<const lsp_scene* const> assets, uint32_t uses,
 
 VulkanTrace VulkanTracer::trace(const lsp_trace_options& options, std::span<const LspRay> rays,
                                 std::span<LspHit> hits, bool count, size_t scene) {
+  check_sizes(rays, hits);
   return impl_->trace(options, rays, hits, count, scene);
 }
 
 VulkanTrace VulkanTracer::trace_instances(const lsp_instances& instances, const lsp_trace_options& options,
                                           uint32_t mask, std::span<const LspRay> rays, std::span<LspHit> hits,
                                           bool count) {
+  check_sizes(rays, hits);
   return impl_->trace_instances(instances, options, mask, rays, hits, count);
 }
 

@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <cstdio>
 
+#include "html_text.h"
+
 namespace lsp::sample {
 namespace {
 
@@ -322,44 +324,6 @@ std::string sections(const Figures& f) {
 }
 
 }  // namespace
-
-std::string base64(std::string_view bytes) {
-  constexpr const char* kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string out;
-  for (size_t i = 0; i < bytes.size(); i += 3) {
-    uint32_t word = 0;
-    for (size_t k = 0; k < 3; ++k) {
-      word = word << 8 | (i + k < bytes.size() ? static_cast<uint8_t>(bytes[i + k]) : 0u);
-    }
-    for (size_t k = 0; k < 4; ++k) {
-      out.push_back(k <= bytes.size() - i ? kDigits[word >> (18 - 6 * k) & 63u] : '=');
-    }
-  }
-  return out;
-}
-
-std::string escape_html(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out.push_back(c);
-    }
-  }
-  return out;
-}
 
 std::string make_page(const Figures& f, const Pictures& pictures) {
   const std::string title = escape_html(f.title);

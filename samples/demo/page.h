@@ -3,7 +3,6 @@
 
 #include <nlohmann/json.hpp>
 #include <string>
-#include <string_view>
 #include <vector>
 
 namespace lsp::sample {
@@ -34,9 +33,6 @@ struct Pictures {
   std::string approximate;
   std::string difference;
 };
-
-std::string base64(std::string_view bytes);
-std::string escape_html(std::string_view text);
 
 // A page that needs no other file and no network.
 std::string make_page(const Figures& figures, const Pictures& pictures);

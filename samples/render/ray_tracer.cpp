@@ -1,11 +1,6 @@
 #include "ray_tracer.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
-
-#include <chrono>
-
+#include "lsp/in_chunks.hpp"
 #include "lsp/program.h"
 #include "lsp/vulkan_device.hpp"
 
@@ -15,28 +10,21 @@ namespace {
 class CpuTracer : public RayTracer {
  public:
   CpuTracer(const RenderScene& scene, int threads)
-      : scene_(scene), arena_(threads > 0 ? threads : tbb::task_arena::automatic) {}
+      : scene_(scene), threads_(threads > 0 ? static_cast<unsigned>(threads) : machine_threads()) {}
 
   double trace(const lsp_trace_options& options, std::span<const LspRay> rays,
                std::span<LspHit> hits) override {
-    const auto start = std::chrono::steady_clock::now();
-    arena_.execute([&] {
-      tbb::parallel_for(tbb::blocked_range<size_t>(0, rays.size(), 2048), [&](const auto& range) {
-        scene_.trace(options, rays.subspan(range.begin(), range.size()),
-                     hits.subspan(range.begin(), range.size()), nullptr);
-      });
+    return run_in_chunks(rays.size(), threads_, [&](size_t first, size_t count) {
+      scene_.trace(options, rays.subspan(first, count), hits.subspan(first, count), nullptr);
     });
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   }
 
-  std::string device() const override {
-    return "CPU, " + std::to_string(arena_.max_concurrency()) + " threads";
-  }
+  std::string device() const override { return "CPU, " + std::to_string(threads_) + " threads"; }
   std::string load_path() const override { return "mapped"; }
 
  private:
   const RenderScene& scene_;
-  tbb::task_arena arena_;
+  unsigned threads_;
 };
 
 class VulkanRayTracer : public RayTracer {

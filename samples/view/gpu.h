@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "lsp/program.h"
+#include "lsp/vk_make.hpp"
 
 struct GLFWwindow;
 
@@ -15,14 +16,6 @@ namespace lsp::sample {
 
 // Throws lsp::Failure unless `result` is VK_SUCCESS: kLimit when memory ran out, else kInternal.
 void vk_check(VkResult result, const char* where);
-
-// A Vulkan struct with its type set and all else zero.
-template <typename Struct>
-Struct vk_make(VkStructureType type) {
-  Struct out{};
-  out.sType = type;
-  return out;
-}
 
 class Gpu {
  public:

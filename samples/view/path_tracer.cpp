@@ -4,8 +4,6 @@
 #include <chrono>
 #include <cstring>
 
-#include "shader_code.h"
-
 namespace lsp::sample {
 namespace {
 
@@ -122,10 +120,7 @@ VkPipeline PathTracer::pipeline(Kernel kernel, const lsp_vulkan_kind& kind) {
   VkPipeline& pipeline = pipelines_[{kernel, base, kind.flags, kind.parts}];
   if (pipeline != VK_NULL_HANDLE) return pipeline;
   made_pipeline_ = true;
-  const std::span<const uint32_t> code = kernel == Kernel::kShow     ? show_code()
-                                         : kernel == Kernel::kEye    ? eye_code(base)
-                                         : kernel == Kernel::kGather ? gather_code(base)
-                                                                     : light_code(base);
+  const std::span<const uint32_t> code = shader_code(kernel, base);
   auto module_info = vk_make<VkShaderModuleCreateInfo>(VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO);
   module_info.pCode = code.data();
   module_info.codeSize = code.size_bytes();

@@ -9,6 +9,7 @@
 #include <tuple>
 
 #include "device_scene.h"
+#include "shader_code.h"
 
 namespace lsp::sample {
 
@@ -43,7 +44,6 @@ class PathTracer {
   VkBuffer shown() const { return shown_.handle(); }
 
  private:
-  enum class Kernel { kEye, kGather, kLight, kShow };
   void create_layout();
   void create_sets();
   void write_sets();

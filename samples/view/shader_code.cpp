@@ -5,78 +5,20 @@
 namespace lsp::sample {
 namespace {
 
-constexpr uint32_t kEye[] =
-#include "view_eye.spv.inc"
-    ;
-constexpr uint32_t kEyeNtree[] =
-#include "view_eye_ntree.spv.inc"
-    ;
-constexpr uint32_t kEyeWide[] =
-#include "view_eye_wide.spv.inc"
-    ;
-constexpr uint32_t kEyeInstances[] =
-#include "view_eye_instances.spv.inc"
-    ;
-constexpr uint32_t kGather[] =
-#include "view_gather.spv.inc"
-    ;
-constexpr uint32_t kGatherNtree[] =
-#include "view_gather_ntree.spv.inc"
-    ;
-constexpr uint32_t kGatherCells[] =
-#include "view_gather_cells.spv.inc"
-    ;
-constexpr uint32_t kGatherWide[] =
-#include "view_gather_wide.spv.inc"
-    ;
-constexpr uint32_t kGatherInstances[] =
-#include "view_gather_instances.spv.inc"
-    ;
-constexpr uint32_t kLight[] =
-#include "view_light.spv.inc"
-    ;
-constexpr uint32_t kLightNtree[] =
-#include "view_light_ntree.spv.inc"
-    ;
-constexpr uint32_t kLightCells[] =
-#include "view_light_cells.spv.inc"
-    ;
-constexpr uint32_t kLightWide[] =
-#include "view_light_wide.spv.inc"
-    ;
-constexpr uint32_t kLightInstances[] =
-#include "view_light_instances.spv.inc"
-    ;
-constexpr uint32_t kShow[] =
-#include "view_show.spv.inc"
-    ;
+#include "shaders.inc"
+
+using Code = std::span<const uint32_t>;
+// By kernel and base structure. What the eye sees is traced exactly, which cells do not do.
+constexpr Code kCode[3][5] = {
+    {view_eye_instances, view_eye, view_eye_ntree, {}, view_eye_wide},
+    {view_gather_instances, view_gather, view_gather_ntree, view_gather_cells, view_gather_wide},
+    {view_light_instances, view_light, view_light_ntree, view_light_cells, view_light_wide}};
+static_assert(LSP_BASE_BVH == 1 && LSP_BASE_NTREE == 2 && LSP_BASE_CELLS == 3 && LSP_BASE_WIDE == 4);
 
 }  // namespace
 
-// What the eye sees is traced exactly, which cells do not do.
-std::span<const uint32_t> eye_code(uint32_t base_structure) {
-  if (base_structure == LSP_BASE_NTREE) return kEyeNtree;
-  if (base_structure == LSP_BASE_WIDE) return kEyeWide;
-  if (base_structure == kInstancesShader) return kEyeInstances;
-  return kEye;
+std::span<const uint32_t> shader_code(Kernel kernel, uint32_t base_structure) {
+  return kernel == Kernel::kShow ? Code(view_show) : kCode[static_cast<size_t>(kernel)][base_structure];
 }
-
-std::span<const uint32_t> gather_code(uint32_t base_structure) {
-  if (base_structure == LSP_BASE_NTREE) return kGatherNtree;
-  if (base_structure == LSP_BASE_CELLS) return kGatherCells;
-  if (base_structure == LSP_BASE_WIDE) return kGatherWide;
-  if (base_structure == kInstancesShader) return kGatherInstances;
-  return kGather;
-}
-
-std::span<const uint32_t> light_code(uint32_t base_structure) {
-  if (base_structure == LSP_BASE_NTREE) return kLightNtree;
-  if (base_structure == LSP_BASE_CELLS) return kLightCells;
-  if (base_structure == LSP_BASE_WIDE) return kLightWide;
-  if (base_structure == kInstancesShader) return kLightInstances;
-  return kLight;
-}
-
-std::span<const uint32_t> show_code() { return kShow; }
 
 }  // namespace lsp::sample

@@ -7,12 +7,9 @@
 
 namespace lsp::sample {
 
-// In place of a structure, as in an lsp_vulkan_kind of instances.
-constexpr uint32_t kInstancesShader = 0;
+enum class Kernel { kEye, kGather, kLight, kShow };
 
-std::span<const uint32_t> eye_code(uint32_t base_structure);
-std::span<const uint32_t> gather_code(uint32_t base_structure);
-std::span<const uint32_t> light_code(uint32_t base_structure);
-std::span<const uint32_t> show_code();
+// `base_structure` is that of an lsp_vulkan_kind, 0 of one of instances; kShow has the same for all.
+std::span<const uint32_t> shader_code(Kernel kernel, uint32_t base_structure);
 
 }  // namespace lsp::sample

@@ -20,6 +20,7 @@
 #include "lsp/vulkan_device.hpp"
 #include "meshes.h"
 #include "surface_rays.h"
+#include "traced.h"
 #include "view_rays.h"
 #include "writer.h"
 
@@ -70,15 +71,6 @@ lsp::Baked& baked_room() {
   return baked;
 }
 
-std::vector<LspHit> trace(const lsp_scene& scene, const lsp_trace_options& options,
-                          const std::vector<LspRay>& rays, lsp_trace_counts* counts = nullptr) {
-  std::vector<LspHit> hits(rays.size());
-  lsp_error error;
-  EXPECT_EQ(lsp_trace(&scene, &options, rays.data(), hits.data(), rays.size(), counts, &error), LSP_OK)
-      << error.message;
-  return hits;
-}
-
 lsp_trace_options tables_but(float max_loss, uint32_t flags = 0) {
   return {LSP_TRACE_APPROXIMATE | LSP_TRACE_MAX_LOSS | flags, 0, 0, max_loss};
 }
@@ -88,10 +80,6 @@ double wrong_share(const std::vector<LspHit>& answers, const std::vector<LspHit>
   for (size_t i = 0; i < truth.size(); ++i)
     wrong += (answers[i].primitive == LSP_NONE) != (truth[i].primitive == LSP_NONE);
   return double(wrong) / double(truth.size());
-}
-
-bool same_bits(const std::vector<LspHit>& a, const std::vector<LspHit>& b) {
-  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(LspHit)) == 0;
 }
 
 TEST(Cells, DialGoesFromTablesAloneToNearExact) {

@@ -20,6 +20,7 @@
 #include "lsp/vulkan_device.hpp"
 #include "meshes.h"
 #include "surface_rays.h"
+#include "traced.h"
 #include "writer.h"
 
 namespace lsp::test {
@@ -60,19 +61,6 @@ BakeOptions options_of(Base base, Purpose purpose = Purpose::kAll) {
   options.line_space.depths = {base == Base::kNTree ? 1u : 3u};
   if (purpose == Purpose::kVisibility) options.line_space.kind = LineSpaceKind::kBinary;
   return options;
-}
-
-std::vector<LspHit> trace(const lsp_scene& scene, const lsp_trace_options& options,
-                          const std::vector<LspRay>& rays) {
-  std::vector<LspHit> hits(rays.size());
-  lsp_error error;
-  EXPECT_EQ(lsp_trace(&scene, &options, rays.data(), hits.data(), rays.size(), nullptr, &error), LSP_OK)
-      << error.message;
-  return hits;
-}
-
-bool same_bits(const std::vector<LspHit>& a, const std::vector<LspHit>& b) {
-  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(LspHit)) == 0;
 }
 
 double hit_share(const std::vector<LspHit>& hits) {

@@ -20,6 +20,8 @@
 #include "lsp/scene_file.hpp"
 #include "meshes.h"
 #include "surface_rays.h"
+#include "trace_shader.h"
+#include "traced.h"
 #include "writer.h"
 
 // Drivers leave memory behind, in modules that are gone at the end: leaks are looked for in the other tests.
@@ -139,13 +141,6 @@ Names operator+(Names a, const Names& b) {
 
 lsp_trace_options by_tables(uint32_t quality, uint32_t flags = 0) {
   return {LSP_TRACE_APPROXIMATE | flags, 0, quality};
-}
-
-std::vector<LspHit> on_cpu(const lsp_scene& scene, const lsp_trace_options& options,
-                           const std::vector<LspRay>& rays) {
-  std::vector<LspHit> hits(rays.size());
-  EXPECT_EQ(lsp_trace(&scene, &options, rays.data(), hits.data(), rays.size(), nullptr, nullptr), LSP_OK);
-  return hits;
 }
 
 // Of occlusion all that is asked is whether t is finite.
@@ -335,10 +330,10 @@ TEST(Loading, TheCpuReadsTheSameSections) {
       lsp_trace_options options{occlusion != 0 ? LSP_TRACE_OCCLUSION : 0u, 0, LSP_QUALITY_ACCURATE};
       if (kinds != LSP_USE_EXACT) options.flags |= LSP_TRACE_APPROXIMATE;
       if (kinds == LSP_USE_TABLES) options.quality = LSP_QUALITY_FAST;
-      const std::vector<LspHit> truth = on_cpu(scene, options, rays);
+      const std::vector<LspHit> truth = trace(scene, options, rays);
       const Names names = sections_for(scene, kinds | occlusion);
       const Unreadable others(scene, names);
-      EXPECT_EQ(differing(on_cpu(scene, options, rays), truth, false), 0u);
+      EXPECT_EQ(differing(trace(scene, options, rays), truth, false), 0u);
       lsp_trace_counts counts{};  // counted rays go one after the other
       LspHit hit;
       EXPECT_EQ(lsp_trace(&scene, &options, rays.data(), &hit, 1, &counts, nullptr), LSP_OK);
@@ -394,7 +389,7 @@ void expect_answers_of_the_whole_file(const BakedScene& scene, uint32_t uses, ui
   if ((uses & LSP_USE_EXACT) != 0) options.flags &= ~LSP_TRACE_APPROXIMATE;
   tracer.trace(options, rays, hits);
   if ((uses & LSP_USE_TABLES) != 0) options.quality = LSP_QUALITY_FAST;
-  EXPECT_EQ(differing(hits, on_cpu(*scene, options, rays), occlusion), 0u) << uses;
+  EXPECT_EQ(differing(hits, trace(*scene, options, rays), occlusion), 0u) << uses;
 }
 
 TEST_P(LoadingOnVulkan, AnswersAreThoseOfTheWholeFile) {
@@ -418,35 +413,23 @@ class Engine {
     VkDescriptorSet sets[kFrames] = {};
   };
   struct Frame {
+    explicit Frame(Device& device) : commands(device) {}
     Buffer rays, hits;
-    VkCommandBuffer commands = VK_NULL_HANDLE;
-    VkFence fence = VK_NULL_HANDLE;
+    Commands commands;
   };
 
   Engine(const lsp_scene& scene, const std::vector<LspRay>& rays, const VulkanOptions& options)
-      : device_(options), scene_(scene), rays_(rays) {
-    constexpr VkMemoryPropertyFlags kHost =
-        VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
+      : device_(options), scene_(scene), rays_(rays), shader_(device_, 4 * kFrames) {
     const VkDeviceSize bytes = rays.size() * sizeof(LspRay);
     for (Frame& frame : frames_) {
-      frame.rays = Buffer(device_, bytes, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, kHost, 0);
-      frame.hits = Buffer(device_, bytes, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, kHost, 0);
+      frame.rays = Buffer(device_, bytes, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, kHostMemory, 0);
+      frame.hits = Buffer(device_, bytes, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, kHostMemory, 0);
       std::memcpy(frame.rays.mapped(), rays.data(), bytes);
-      make_commands(frame);
     }
-    copies_.hits = Buffer(device_, kPiece, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, kHost, 0);
-    make_commands(copies_);
-    make_layout();
   }
   ~Engine() {
-    const auto& vk = device_.vk;
-    vk.vkDeviceWaitIdle(device_.handle);
-    for (VkPipeline pipeline : pipelines_) vk.vkDestroyPipeline(device_.handle, pipeline, nullptr);
-    for (Frame& frame : frames_) vk.vkDestroyFence(device_.handle, frame.fence, nullptr);
-    vk.vkDestroyFence(device_.handle, copies_.fence, nullptr);
-    vk.vkDestroyDescriptorPool(device_.handle, pool_, nullptr);
-    vk.vkDestroyPipelineLayout(device_.handle, layout_, nullptr);
-    vk.vkDestroyDescriptorSetLayout(device_.handle, set_layout_, nullptr);
+    device_.vk.vkDeviceWaitIdle(device_.handle);
+    for (VkPipeline pipeline : pipelines_) device_.vk.vkDestroyPipeline(device_.handle, pipeline, nullptr);
   }
 
   // From `old` to `uses`; between the pieces of the upload `meanwhile` is called.
@@ -482,16 +465,15 @@ class Engine {
     ASSERT_EQ(lsp_vulkan_plan_trace(&scene_, &loaded.plan, &options, &kind, &error), LSP_OK) << error.message;
     const VkPipeline pipeline = make_pipeline(loaded.plan, kind);
     const lsp_vulkan_trace_constants constants{0, 0, static_cast<uint32_t>(rays_.size()), kind.dial};
-    begin(frame);
-    lsp_vulkan_record_trace(&device_.functions, frame.commands, pipeline, layout_, loaded.sets[number],
+    const VkCommandBuffer commands = frame.commands.record();
+    lsp_vulkan_record_trace(&device_.functions, commands, pipeline, shader_.layout(), loaded.sets[number],
                             &constants);
-    VkMemoryBarrier barrier{};
-    barrier.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;
+    auto barrier = vk_make<VkMemoryBarrier>(VK_STRUCTURE_TYPE_MEMORY_BARRIER);
     barrier.srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT;
     barrier.dstAccessMask = VK_ACCESS_HOST_READ_BIT;
-    device_.vk.vkCmdPipelineBarrier(frame.commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
+    device_.vk.vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
                                     VK_PIPELINE_STAGE_HOST_BIT, 0, 1, &barrier, 0, nullptr, 0, nullptr);
-    end(frame);
+    frame.commands.submit();
     in_flight_[number] = true;
   }
 
@@ -509,85 +491,22 @@ class Engine {
  private:
   void collect(size_t number) {
     if (!std::exchange(in_flight_[number], false)) return;
-    wait(frames_[number]);
+    frames_[number].commands.wait();
     const auto* hits = static_cast<const LspHit*>(frames_[number].hits.mapped());
     hits_.emplace_back(hits, hits + rays_.size());
   }
-  void wait(Frame& frame) {
-    check(device_.vk.vkWaitForFences(device_.handle, 1, &frame.fence, VK_TRUE, UINT64_MAX),
-          "vkWaitForFences");
-  }
-  void begin(Frame& frame) {
-    VkCommandBufferBeginInfo info{};
-    info.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
-    info.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
-    check(device_.vk.vkBeginCommandBuffer(frame.commands, &info), "vkBeginCommandBuffer");
-  }
-  void end(Frame& frame) {
-    check(device_.vk.vkEndCommandBuffer(frame.commands), "vkEndCommandBuffer");
-    check(device_.vk.vkResetFences(device_.handle, 1, &frame.fence), "vkResetFences");
-    VkSubmitInfo submit{};
-    submit.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO;
-    submit.commandBufferCount = 1;
-    submit.pCommandBuffers = &frame.commands;
-    check(device_.vk.vkQueueSubmit(device_.queue, 1, &submit, frame.fence), "vkQueueSubmit");
-  }
   void upload(const lsp_vulkan_copy& piece, const Buffer& destination) {
-    wait(copies_);
-    std::memcpy(copies_.hits.mapped(), piece.source, piece.bytes);
-    begin(copies_);
-    lsp_vulkan_record_copy(&device_.functions, copies_.commands, &piece, copies_.hits.handle(), 0,
-                           destination.handle());
-    lsp_vulkan_record_upload_barrier(&device_.functions, copies_.commands);
-    end(copies_);
-  }
-  void make_commands(Frame& frame) {
-    VkCommandBufferAllocateInfo info{};
-    info.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO;
-    info.commandPool = device_.pool;
-    info.commandBufferCount = 1;
-    check(device_.vk.vkAllocateCommandBuffers(device_.handle, &info, &frame.commands),
-          "vkAllocateCommandBuffers");
-    VkFenceCreateInfo fence{};
-    fence.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO;
-    fence.flags = VK_FENCE_CREATE_SIGNALED_BIT;
-    check(device_.vk.vkCreateFence(device_.handle, &fence, nullptr, &frame.fence), "vkCreateFence");
-  }
-  void make_layout() {
-    constexpr uint32_t kSets = 4 * kFrames;
-    VkDescriptorSetLayoutBinding bindings[LSP_BINDING_COUNT];
-    lsp_vulkan_layout_bindings(bindings);
-    VkDescriptorSetLayoutCreateInfo set{};
-    set.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO;
-    set.bindingCount = LSP_BINDING_COUNT;
-    set.pBindings = bindings;
-    check(device_.vk.vkCreateDescriptorSetLayout(device_.handle, &set, nullptr, &set_layout_), "set layout");
-    const VkPushConstantRange push{VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof(lsp_vulkan_trace_constants)};
-    VkPipelineLayoutCreateInfo layout{};
-    layout.sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO;
-    layout.setLayoutCount = 1;
-    layout.pSetLayouts = &set_layout_;
-    layout.pushConstantRangeCount = 1;
-    layout.pPushConstantRanges = &push;
-    check(device_.vk.vkCreatePipelineLayout(device_.handle, &layout, nullptr, &layout_), "pipeline layout");
-    const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, kSets * LSP_BINDING_COUNT};
-    VkDescriptorPoolCreateInfo pool{};
-    pool.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO;
-    pool.maxSets = kSets;
-    pool.poolSizeCount = 1;
-    pool.pPoolSizes = &size;
-    check(device_.vk.vkCreateDescriptorPool(device_.handle, &pool, nullptr, &pool_), "descriptor pool");
+    const VkCommandBuffer commands = copies_.record();
+    std::memcpy(staging_.mapped(), piece.source, piece.bytes);
+    lsp_vulkan_record_copy(&device_.functions, commands, &piece, staging_.handle(), 0, destination.handle());
+    lsp_vulkan_record_upload_barrier(&device_.functions, commands);
+    copies_.submit();
   }
   void make_sets(Loaded& loaded) {
     std::vector<VkBuffer> handles;
     for (const auto& buffer : loaded.buffers) handles.push_back(buffer->handle());
     for (size_t i = 0; i < kFrames; ++i) {
-      VkDescriptorSetAllocateInfo info{};
-      info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO;
-      info.descriptorPool = pool_;
-      info.descriptorSetCount = 1;
-      info.pSetLayouts = &set_layout_;
-      check(device_.vk.vkAllocateDescriptorSets(device_.handle, &info, &loaded.sets[i]), "descriptor sets");
+      loaded.sets[i] = shader_.allocate_set();
       lsp_vulkan_write_descriptors(&device_.functions, device_.handle, loaded.sets[i], &loaded.plan,
                                    handles.data(), frames_[i].rays.handle(), frames_[i].hits.handle(),
                                    VK_NULL_HANDLE);
@@ -595,43 +514,22 @@ class Engine {
   }
   VkPipeline make_pipeline(lsp_vulkan_plan plan, const lsp_vulkan_kind& kind) {
     plan.base_structure = kind.base_structure;
-    VkShaderModuleCreateInfo code{};
-    code.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
-    code.pCode = lsp_vulkan_trace_spirv(&plan, 0, &code.codeSize);
-    VkShaderModule module = VK_NULL_HANDLE;
-    check(device_.vk.vkCreateShaderModule(device_.handle, &code, nullptr, &module), "vkCreateShaderModule");
-    const VkSpecializationMapEntry entries[] = {
-        {LSP_VULKAN_STACK_CONSTANT, offsetof(lsp_vulkan_kind, stack), sizeof(uint32_t)},
-        {LSP_VULKAN_FLAGS_CONSTANT, offsetof(lsp_vulkan_kind, flags), sizeof(uint32_t)},
-        {LSP_VULKAN_PARTS_CONSTANT, offsetof(lsp_vulkan_kind, parts), sizeof(uint32_t)}};
-    const VkSpecializationInfo specialization{3, entries, sizeof kind, &kind};
-    VkComputePipelineCreateInfo info{};
-    info.sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO;
-    info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
-    info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
-    info.stage.module = module;
-    info.stage.pName = "main";
-    info.stage.pSpecializationInfo = &specialization;
-    info.layout = layout_;
-    VkPipeline pipeline = VK_NULL_HANDLE;
-    check(device_.vk.vkCreateComputePipelines(device_.handle, VK_NULL_HANDLE, 1, &info, nullptr, &pipeline),
-          "vkCreateComputePipelines");
-    device_.vk.vkDestroyShaderModule(device_.handle, module, nullptr);
-    return pipelines_.emplace_back(pipeline);
+    size_t bytes = 0;
+    const uint32_t* words = lsp_vulkan_trace_spirv(&plan, 0, &bytes);
+    return pipelines_.emplace_back(shader_.create_pipeline(words, bytes, kind));
   }
 
   Device device_;
   const lsp_scene& scene_;
   const std::vector<LspRay>& rays_;
-  Frame frames_[kFrames];
-  Frame copies_;  // its `hits` are staging memory
+  TraceShader shader_;
+  Buffer staging_{device_, kPiece, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, kHostMemory, 0};
+  Commands copies_{device_};
+  Frame frames_[kFrames] = {Frame(device_), Frame(device_), Frame(device_)};
   bool in_flight_[kFrames] = {};
   size_t submitted_ = 0;
   std::vector<std::vector<LspHit>> hits_;
   std::vector<VkPipeline> pipelines_;
-  VkDescriptorSetLayout set_layout_ = VK_NULL_HANDLE;
-  VkPipelineLayout layout_ = VK_NULL_HANDLE;
-  VkDescriptorPool pool_ = VK_NULL_HANDLE;
 };
 
 // Tables first, exact data while frames are in flight, then ambient occlusion alone: every frame has the
@@ -667,12 +565,12 @@ TEST(Loading, FinerDataArrivesAndLeavesBetweenFrames) {
   engine->submit(next, balanced);
   engine->submit(next, {0, 0});
   now = std::move(next);  // the buffers are all kept
-  const auto truth = on_cpu(scene, by_tables(LSP_QUALITY_FAST), rays);
+  const auto truth = trace(scene, by_tables(LSP_QUALITY_FAST), rays);
   const std::vector<std::vector<LspHit>> hits = engine->finish();
   ASSERT_EQ(hits.size(), frames + 2);
   for (size_t i = 0; i < frames; ++i) EXPECT_EQ(differing(hits[i], truth, false), 0u) << "frame " << i;
-  EXPECT_EQ(differing(hits[frames], on_cpu(scene, balanced, rays), false), 0u);
-  EXPECT_EQ(differing(hits[frames + 1], on_cpu(scene, {0, 0}, rays), false), 0u);
+  EXPECT_EQ(differing(hits[frames], trace(scene, balanced, rays), false), 0u);
+  EXPECT_EQ(differing(hits[frames + 1], trace(scene, {0, 0}, rays), false), 0u);
 
   const lsp_trace_options occlusion = by_tables(LSP_QUALITY_BALANCED, LSP_TRACE_OCCLUSION);
   engine->submit(now, balanced);  // the last that reads what goes
@@ -684,8 +582,8 @@ TEST(Loading, FinerDataArrivesAndLeavesBetweenFrames) {
   now = std::move(next);  // here the dropped buffers end
   engine->submit(now, occlusion);
   const auto last = engine->finish();
-  EXPECT_EQ(
-      differing(last.at(0), on_cpu(scene, by_tables(LSP_QUALITY_FAST, LSP_TRACE_OCCLUSION), rays), true), 0u);
+  EXPECT_EQ(differing(last.at(0), trace(scene, by_tables(LSP_QUALITY_FAST, LSP_TRACE_OCCLUSION), rays), true),
+            0u);
   for (const std::string& message : engine->messages()) ADD_FAILURE() << message;
 }
 

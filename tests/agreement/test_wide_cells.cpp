@@ -16,6 +16,7 @@
 #include "surface_rays.h"
 #include "trace_cells_wide.h"
 #include "trace_wide_lanes.h"
+#include "traced.h"
 
 namespace lsp::test {
 namespace {
@@ -136,10 +137,8 @@ std::vector<LspRay> rays_of(const lsp::Baked& baked) {
 // A counted trace is that of single rays.
 std::vector<LspHit> single_rays(const lsp_scene& scene, const lsp_trace_options& options,
                                 const std::vector<LspRay>& rays) {
-  std::vector<LspHit> hits(rays.size());
   lsp_trace_counts counts{};
-  EXPECT_EQ(lsp_trace(&scene, &options, rays.data(), hits.data(), rays.size(), &counts, nullptr), LSP_OK);
-  return hits;
+  return trace(scene, options, rays, &counts);
 }
 
 void expect_same(const std::vector<LspHit>& single, const std::vector<LspHit>& wide,

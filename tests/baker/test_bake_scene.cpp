@@ -1,5 +1,4 @@
 // lsp-bake --instances: scenes whose rays are to hit what those of one bake of everything hit.
-#include <sys/wait.h>
 
 #include <cmath>
 #include <cstdlib>
@@ -10,6 +9,7 @@
 
 #include "../import/gltf_builder.h"
 #include "lsp/instanced_scene.hpp"
+#include "shell.h"
 
 namespace lsp_test {
 namespace {
@@ -20,16 +20,9 @@ using namespace lsp;
 class BakeScene : public MeshFiles {
  protected:
   int run(const std::string& program, const std::string& arguments) {
-    const std::string command = "cd '" + folder_.string() + "' && '" + LSP_BIN_DIR + "/" + program + "' " +
-                                arguments + " >'" + (folder_ / "out").string() + "' 2>'" +
-                                (folder_ / "err").string() + "'";
-    const int status = std::system(command.c_str());
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    return lsp::test::shell(program + " " + arguments + " >out 2>err", folder_);
   }
-  std::string read(const std::string& name) const {
-    std::ifstream file(folder_ / name, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-  }
+  std::string read(const std::string& name) const { return lsp::test::read_bytes(folder_ / name); }
   std::string path(const std::string& name) const { return (folder_ / name).string(); }
   // Exact trees alone: what the rays hit is the question here.
   json bake_scene(const std::string& inputs, const std::string& options = "") {

@@ -9,10 +9,12 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <thread>
+
+#include "grid_mesh.h"
+#include "shell.h"
 
 namespace lsp::test {
 namespace {
@@ -22,43 +24,20 @@ const std::string kBake = std::string(LSP_BIN_DIR) + "/lsp-bake";
 
 class LspBake : public ::testing::Test {
  protected:
-  void SetUp() override {
-    std::string name = (fs::temp_directory_path() / "lsp-bake-XXXXXX").string();
-    ASSERT_NE(mkdtemp(name.data()), nullptr);
-    folder_ = name;
-    write_grid("grid.obj", 60);
-  }
-  // A bumpy grid: enough triangles to give every option something to do.
-  void write_grid(const char* name, int size) {
-    write_heights(name, size, [](int i, int j) { return double((i * 7 + j * 13) % 5); });
-  }
-  void write_heights(const char* name, int size, double (*height)(int, int)) {
-    std::ofstream obj(folder_ / name);
-    for (int i = 0; i <= size; ++i)
-      for (int j = 0; j <= size; ++j) obj << "v " << i << " " << height(i, j) << " " << j << "\n";
-    for (int i = 0; i < size; ++i)
-      for (int j = 0; j < size; ++j) {
-        const int a = i * (size + 1) + j + 1;
-        obj << "f " << a << " " << a + 1 << " " << a + size + 2 << " " << a + size + 1 << "\n";
-      }
-  }
-  void TearDown() override { fs::remove_all(folder_); }
+  LspBake() { write_grid("grid.obj", 60); }
+  // Enough triangles to give every option something to do.
+  void write_grid(const char* name, int size) { std::ofstream(folder_ / name) << grid_obj(size); }
 
-  int run(const std::string& arguments) {
-    const std::string command =
-        "cd '" + folder_.string() + "' && '" + kBake + "' " + arguments + " >out 2>err";
-    const int status = std::system(command.c_str());
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  int run(const std::string& arguments) const {
+    return shell("lsp-bake " + arguments + " >out 2>err", folder_);
   }
-  std::string read(const std::string& name) const {
-    std::ifstream file(folder_ / name, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-  }
+  std::string read(const std::string& name) const { return read_bytes(folder_ / name); }
   size_t files() const {
     return size_t(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
   }
 
-  fs::path folder_;
+  const TemporaryFolder temporary_;
+  const fs::path folder_ = temporary_.path();
 };
 
 TEST_F(LspBake, GivesTheSameBytesOnAnyNumberOfThreads) {
@@ -118,7 +97,8 @@ Bytes bytes_of(const nlohmann::json& report) {
 
 TEST_F(LspBake, SmallThingsStaySmall) {
   write_grid("two.obj", 1);
-  write_heights("dunes.obj", 48, [](int i, int j) { return 6 * std::sin(i * 0.13) * std::sin(j * 0.11); });
+  std::ofstream(folder_ / "dunes.obj")
+      << grid_obj(48, [](int i, int j) { return 6 * std::sin(i * 0.13) * std::sin(j * 0.11); });
   for (const char* name : {"two", "dunes"}) {
     ASSERT_EQ(run(std::string(name) + ".obj -o a.lsp --preset fast --json"), 0) << read("err");
     const auto report = nlohmann::json::parse(read("out"));
@@ -219,10 +199,7 @@ TEST_F(LspBake, ExitsAsTheErrorIs) {
 
 TEST_F(LspBake, FilesAreNoLongerThanAskedFor) {
   const auto grid_of = [&](const char* file) {
-    std::ostringstream command;
-    command << "cd '" << folder_.string() << "' && '" << LSP_BIN_DIR << "/lsp-info' --json " << file
-            << " >info";
-    EXPECT_EQ(std::system(command.str().c_str()), 0);
+    EXPECT_EQ(shell(std::string("lsp-info --json ") + file + " >info", folder_), 0);
     return nlohmann::json::parse(read("info"))["provenance"]["options"]["cells"].get<int>();
   };
   write_grid("hills.obj", 24);
@@ -295,9 +272,7 @@ TEST_F(LspBake, EveryFileReadIsInTheHashAndTheDepfile) {
   EXPECT_EQ(read("a.d"), "a.lsp: \\\n  my\\ scene/a.obj \\\n  my\\ scene/a.mtl \\\n  grid.obj\n");
   ASSERT_EQ(run("'my scene/a.obj' -o b.lsp --depth 3 --compress zstd"), 0);
   const auto validate = [&](const std::string& file, const std::string& meshes) {
-    const std::string command = "cd '" + folder_.string() + "' && '" + LSP_BIN_DIR +
-                                "/lsp-validate' --quiet " + file + " --mesh " + meshes + " 2>/dev/null";
-    return WEXITSTATUS(std::system(command.c_str()));
+    return shell("lsp-validate --quiet " + file + " --mesh " + meshes + " 2>/dev/null", folder_);
   };
   EXPECT_EQ(validate("a.lsp", "'my scene/a.obj' grid.obj"), 0);
   EXPECT_EQ(validate("a.lsp", "grid.obj 'my scene/a.obj'"), 7) << "the order counts";
@@ -320,12 +295,10 @@ TEST_F(LspBake, KeepsWhatTheErrorAllows) {
 }
 
 TEST_F(LspBake, WritesBinaryLineSpaces) {
-  const std::string validate = std::string(LSP_BIN_DIR) + "/lsp-validate";
   for (const char* base : {"bvh --depth 4", "ntree --levels 2"}) {
     SCOPED_TRACE(base);
     ASSERT_EQ(run(std::string("grid.obj -o a.lsp --for visibility --resolution 4 --base ") + base), 0);
-    const std::string file = (folder_ / "a.lsp").string();
-    EXPECT_EQ(std::system(("'" + validate + "' --level geometry '" + file + "'").c_str()), 0);
+    EXPECT_EQ(shell("lsp-validate --level geometry a.lsp", folder_), 0);
   }
 }
 
@@ -351,10 +324,9 @@ TEST_F(LspBake, LeavesTheOldFileWholeWhenKilled) {
 
 TEST_F(LspBake, ReportsAFullDisk) {
   // No file may grow beyond 64 kB: the write fails as on a full disk.
-  const std::string command = "cd '" + folder_.string() + "' && trap '' XFSZ && ulimit -f 64 && '" + kBake +
-                              "' grid.obj -o a.lsp --depth 4 --quiet 2>/dev/null";
-  const int status = std::system(command.c_str());
-  EXPECT_EQ(WEXITSTATUS(status), 2);
+  EXPECT_EQ(shell("trap '' XFSZ && ulimit -f 64 && lsp-bake grid.obj -o a.lsp --depth 4 --quiet 2>/dev/null",
+                  folder_),
+            2);
   EXPECT_EQ(files(), 1u) << "something was left behind";
 }
 

@@ -1,13 +1,14 @@
 // lsp-bake --shard and lsp-merge as their users run them.
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <sstream>
+
+#include "grid_mesh.h"
+#include "shell.h"
 
 namespace lsp::test {
 namespace {
@@ -16,24 +17,8 @@ namespace fs = std::filesystem;
 
 class LspMerge : public ::testing::Test {
  protected:
-  void SetUp() override {
-    std::string name = (fs::temp_directory_path() / "lsp-merge-XXXXXX").string();
-    ASSERT_NE(mkdtemp(name.data()), nullptr);
-    folder_ = name;
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  // A bumpy patch: an object.
-  void write_object(const char* name, int size) {
-    std::ofstream obj(folder_ / name);
-    for (int i = 0; i <= size; ++i)
-      for (int j = 0; j <= size; ++j) obj << "v " << i << " " << (i * 7 + j * 13) % 5 << " " << j << "\n";
-    for (int i = 0; i < size; ++i)
-      for (int j = 0; j < size; ++j) {
-        const int a = i * (size + 1) + j + 1;
-        obj << "f " << a << " " << a + 1 << " " << a + size + 2 << " " << a + size + 1 << "\n";
-      }
-  }
+  // An object.
+  void write_object(const char* name, int size) { std::ofstream(folder_ / name) << grid_obj(size); }
   // A room with a coloured box in it.
   void write_room(const char* name) {
     std::ofstream(folder_ / "room.mtl") << "newmtl wall\nKd .8 .8 .8\nnewmtl box\nKd .8 .1 .1\nKe .2 0 0\n";
@@ -51,18 +36,10 @@ class LspMerge : public ::testing::Test {
     add_box(-1.3, 0.9, "box");
   }
 
-  // In the folder, with the programs on the path.
-  int shell(const std::string& command) {
-    const std::string whole = "cd '" + folder_.string() +
-                              "' && export PATH='" LSP_BIN_DIR ":'\"$PATH\" && { " + command +
-                              "\n} >out 2>err";
-    const int status = std::system(whole.c_str());
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  int shell(const std::string& command) const {
+    return test::shell("{ " + command + "\n} >out 2>err", folder_);
   }
-  std::string read(const std::string& name) const {
-    std::ifstream file(folder_ / name, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-  }
+  std::string read(const std::string& name) const { return read_bytes(folder_ / name); }
 
   // Bakes in one, and in `count` shards, of which the last are given first.
   void expect_the_one_bake(const std::string& mesh_and_options, int count) {
@@ -85,7 +62,8 @@ class LspMerge : public ::testing::Test {
     ASSERT_GT(read("one.lsp").size(), 4096u);
   }
 
-  fs::path folder_;
+  const TemporaryFolder temporary_;
+  const fs::path folder_ = temporary_.path();
 };
 
 TEST_F(LspMerge, AnObjectIsTheOneBakeInAnyNumberOfParts) {

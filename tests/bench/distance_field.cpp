@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "timing.h"
+#include "lsp/in_chunks.hpp"
 
 namespace lsp::bench {
 namespace {

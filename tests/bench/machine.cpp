@@ -8,9 +8,9 @@
 #include <fstream>
 
 #include "embree_scene.h"
+#include "lsp/in_chunks.hpp"
 #include "lsp/layout.h"
 #include "lsp/program.h"
-#include "timing.h"
 
 namespace lsp::bench {
 namespace {

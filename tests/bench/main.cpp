@@ -8,6 +8,7 @@
 #include "answers.h"
 #include "context.h"
 #include "lsp/command_line.h"
+#include "lsp/in_chunks.hpp"
 #include "machine.h"
 #include "timing.h"
 

@@ -3,12 +3,16 @@
 #include <cmath>
 #include <cstdio>
 
-#include "escape.h"
+#include "html_text.h"
 #include "lsp/program.h"
 #include "output_file.h"
 
 namespace lsp::bench {
 namespace {
+
+using sample::base64;
+using sample::escape_html;
+using sample::write_file;
 
 constexpr const char* kStyle = R"(
 :root{color-scheme:light dark;--line:#8884;--soft:#8881}
@@ -30,7 +34,7 @@ nav a{margin-right:1rem}
 // "1,234" for whole numbers, fixed digits for the rest, scientific where those would show nothing.
 std::string format(const Json& value, int digits) {
   if (value.is_null()) return "";
-  if (value.is_string()) return escape(value.get<std::string>());
+  if (value.is_string()) return escape_html(value.get<std::string>());
   if (value.is_boolean()) return value.get<bool>() ? "yes" : "no";
   char text[64];
   if (value.is_number_integer()) {
@@ -51,8 +55,8 @@ std::string format(const Json& value, int digits) {
 }
 
 std::string table_html(const Table& table) {
-  std::string html = "<h3>" + escape(table.title) + "</h3>\n";
-  if (!table.caption.empty()) html += "<p class=caption>" + escape(table.caption) + "</p>\n";
+  std::string html = "<h3>" + escape_html(table.title) + "</h3>\n";
+  if (!table.caption.empty()) html += "<p class=caption>" + escape_html(table.caption) + "</p>\n";
   html += "<div class=scroll><table><thead><tr>";
   std::vector<bool> words;
   for (const Column& column : table.columns) {
@@ -60,7 +64,7 @@ std::string table_html(const Table& table) {
     for (const Json& row : table.rows)
       word = word || (row.contains(column.key) && row[column.key].is_string());
     words.push_back(word);
-    html += std::string("<th") + (word ? " class=word" : "") + ">" + escape(column.title) + "</th>";
+    html += std::string("<th") + (word ? " class=word" : "") + ">" + escape_html(column.title) + "</th>";
   }
   html += "</tr></thead><tbody>\n";
   for (const Json& row : table.rows) {
@@ -76,14 +80,14 @@ std::string table_html(const Table& table) {
 }
 
 std::string grid_html(const PictureGrid& grid) {
-  std::string html = "<h3>" + escape(grid.title) + "</h3>\n";
-  if (!grid.caption.empty()) html += "<p class=caption>" + escape(grid.caption) + "</p>\n";
+  std::string html = "<h3>" + escape_html(grid.title) + "</h3>\n";
+  if (!grid.caption.empty()) html += "<p class=caption>" + escape_html(grid.caption) + "</p>\n";
   html += "<div class=scroll><div class=pictures style='grid-template-columns:repeat(" +
           std::to_string(grid.columns) + ",minmax(10rem,1fr))'>\n";
   for (const Picture& picture : grid.pictures) {
-    html += "<figure><img loading=lazy alt='" + escape(picture.caption) + "' src='data:image/" +
+    html += "<figure><img loading=lazy alt='" + escape_html(picture.caption) + "' src='data:image/" +
             (picture.jpeg ? "jpeg" : "png") + ";base64," + base64(picture.bytes) + "'><figcaption>" +
-            escape(picture.caption) + "</figcaption></figure>\n";
+            escape_html(picture.caption) + "</figcaption></figure>\n";
   }
   return html + "</div></div>\n";
 }
@@ -93,31 +97,14 @@ std::string list_html(const char* name, const std::vector<std::string>& items) {
   std::string html = std::string("<ul class=") + name + ">\n";
   // The page shows the first few; report.json holds all.
   constexpr size_t kShown = 24;
-  for (size_t i = 0; i < items.size() && i < kShown; ++i) html += "<li>" + escape(items[i]) + "</li>\n";
+  for (size_t i = 0; i < items.size() && i < kShown; ++i) html += "<li>" + escape_html(items[i]) + "</li>\n";
   if (items.size() > kShown) {
     html += "<li>and " + std::to_string(items.size() - kShown) + " more, in report.json</li>\n";
   }
   return html + "</ul>\n";
 }
 
-using sample::write_file;
-
 }  // namespace
-
-std::string base64(const std::string& bytes) {
-  static constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string out;
-  for (size_t i = 0; i < bytes.size(); i += 3) {
-    uint32_t word = 0;
-    for (size_t k = 0; k < 3; ++k) {
-      word = word << 8 | (i + k < bytes.size() ? static_cast<uint8_t>(bytes[i + k]) : 0u);
-    }
-    for (size_t k = 0; k < 4; ++k) {
-      out += i + k > bytes.size() ? '=' : kDigits[(word >> (18 - 6 * k)) & 63];
-    }
-  }
-  return out;
-}
 
 std::string to_csv(const Table& table) {
   const auto quoted = [](const std::string& text) {
@@ -160,8 +147,8 @@ std::string to_html(const Report& report) {
   std::string html =
       "<!doctype html>\n<html lang=en><meta charset=utf-8>\n"
       "<meta name=viewport content='width=device-width,initial-scale=1'>\n<title>" +
-      escape(report.title) + "</title>\n<style>" + kStyle + "</style>\n<h1>" + escape(report.title) +
-      "</h1>\n";
+      escape_html(report.title) + "</title>\n<style>" + kStyle + "</style>\n<h1>" +
+      escape_html(report.title) + "</h1>\n";
   html += list_html("answers", report.answers);
   if (!report.warnings.empty()) {
     html += "<details><summary>" + std::to_string(report.warnings.size()) + " warnings</summary>\n" +
@@ -169,15 +156,15 @@ std::string to_html(const Report& report) {
   }
   html += "<nav>";
   for (const Section& section : report.sections) {
-    html += "<a href='#" + section.id + "'>" + escape(section.title) + "</a> ";
+    html += "<a href='#" + section.id + "'>" + escape_html(section.title) + "</a> ";
   }
   html += "</nav>\n";
   for (const Section& section : report.sections) {
-    html += "<h2 id='" + section.id + "'>" + escape(section.title) + "</h2>\n";
-    for (const std::string& paragraph : section.paragraphs) html += "<p>" + escape(paragraph) + "</p>\n";
+    html += "<h2 id='" + section.id + "'>" + escape_html(section.title) + "</h2>\n";
+    for (const std::string& paragraph : section.paragraphs) html += "<p>" + escape_html(paragraph) + "</p>\n";
     for (const Plot& plot : section.plots) {
       html += "<figure>" + to_svg(plot);
-      if (!plot.caption.empty()) html += "<figcaption>" + escape(plot.caption) + "</figcaption>";
+      if (!plot.caption.empty()) html += "<figcaption>" + escape_html(plot.caption) + "</figcaption>";
       html += "</figure>\n";
     }
     for (const PictureGrid& grid : section.pictures) html += grid_html(grid);
@@ -185,8 +172,9 @@ std::string to_html(const Report& report) {
   }
   html += "<h2 id=facts>Measured on</h2>\n<dl>\n";
   for (const auto& [key, value] : report.facts.items()) {
-    html += "<dt>" + escape(key) + "</dt><dd>" +
-            (value.is_string() ? escape(value.get<std::string>()) : escape(value.dump())) + "</dd>\n";
+    html += "<dt>" + escape_html(key) + "</dt><dd>" +
+            (value.is_string() ? escape_html(value.get<std::string>()) : escape_html(value.dump())) +
+            "</dd>\n";
   }
   return html + "</dl>\n</html>\n";
 }

@@ -89,8 +89,6 @@ std::string to_csv(const Table& table);
 Json to_json(const Report& report);
 std::string to_html(const Report& report);
 
-std::string base64(const std::string& bytes);
-
 // Writes report.html, report.json, one .csv per table, one .svg per plot and one .png or .jpg per picture
 // into `directory`, which it makes. Each file is written aside and renamed. Throws Failure(kFile).
 void write_report(const Report& report, const std::filesystem::path& directory);

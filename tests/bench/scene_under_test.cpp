@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "bake_cache.h"
+#include "lsp/in_chunks.hpp"
 #include "lsp/program.h"
 #include "process.h"
-#include "timing.h"
 
 namespace lsp::bench {
 namespace {

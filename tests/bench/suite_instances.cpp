@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "context.h"
+#include "lsp/in_chunks.hpp"
 #include "lsp/instanced_scene.hpp"
 #include "process.h"
 #include "ray_errors.h"

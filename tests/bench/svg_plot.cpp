@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "escape.h"
+#include "html_text.h"
 #include "report.h"
 
 namespace lsp::bench {
@@ -96,7 +96,7 @@ std::string marker_end(size_t series) {
 std::string text(double x, double y, const char* anchor, int size, const std::string& words,
                  const std::string& more = "") {
   return "<text x='" + at(x) + "' y='" + at(y) + "' text-anchor='" + anchor + "' font-size='" +
-         std::to_string(size) + "'" + more + ">" + escape(words) + "</text>\n";
+         std::to_string(size) + "'" + more + ">" + sample::escape_html(words) + "</text>\n";
 }
 
 }  // namespace
@@ -119,7 +119,7 @@ std::string to_svg(const Plot& plot) {
 
   std::string svg = "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 " + number(kWidth) + " " +
                     number(height) + "' role='img' font-family='system-ui,sans-serif' fill='currentColor'>\n";
-  svg += "<title>" + escape(plot.title) + "</title>\n";
+  svg += "<title>" + sample::escape_html(plot.title) + "</title>\n";
   svg += text(kLeft, 22, "start", 16, plot.title, " font-weight='600'");
   svg += "<g stroke='currentColor' stroke-opacity='.18'>\n";
   for (double tick : x.ticks) {
@@ -153,8 +153,8 @@ std::string to_svg(const Plot& plot) {
       if (!std::isfinite(point.x) || !std::isfinite(point.y)) continue;
       const std::string tip = series.name + (point.label.empty() ? "" : ": " + point.label) + " (" +
                               number(point.x) + ", " + number(point.y) + ")";
-      svg +=
-          marker(s, px(point.x), py(point.y)) + "<title>" + escape(tip) + "</title>" + marker_end(s) + "\n";
+      svg += marker(s, px(point.x), py(point.y)) + "<title>" + sample::escape_html(tip) + "</title>" +
+             marker_end(s) + "\n";
     }
     const double lx = kLeft + (s % 2 ? width / 2 : 0) + 6;
     const double ly = bottom + 62 + kLegendRow * static_cast<double>(s / 2);

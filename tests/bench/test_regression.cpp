@@ -12,11 +12,11 @@
 #include <iostream>
 
 #include "context.h"
+#include "lsp/in_chunks.hpp"
 #include "lsp/program.h"
 #include "process.h"
 #include "shapes.h"
 #include "shared_bake.h"
-#include "timing.h"
 #include "verdict.h"
 
 namespace lsp::bench {

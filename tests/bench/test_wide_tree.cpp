@@ -6,11 +6,11 @@
 #include <cstring>
 #include <filesystem>
 
+#include "lsp/in_chunks.hpp"
 #include "lsp/program.h"
 #include "rays.h"
 #include "shapes.h"
 #include "shared_bake.h"
-#include "timing.h"
 #include "verdict.h"
 #include "wide_peer.h"
 

@@ -2,8 +2,8 @@
 
 #include <numeric>
 
+#include "lsp/in_chunks.hpp"
 #include "lsp/program.h"
-#include "timing.h"
 #include "vectors.h"
 #include "wide_tree.h"
 

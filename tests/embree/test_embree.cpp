@@ -12,11 +12,11 @@
 
 #include "embree_scene.h"
 #include "leaks.h"
+#include "lsp/in_chunks.hpp"
 #include "open_file.h"
 #include "ray_errors.h"
 #include "rays.h"
 #include "shared_bake.h"
-#include "timing.h"
 #include "tracer.h"
 #include "verdict.h"
 

@@ -104,6 +104,28 @@ TEST(Info, SaysWhatCellsAre) {
   EXPECT_TRUE(cells["exact_above_loss"]["fast"]["far"].is_null());
 }
 
+// In the words of lsp-bake's report; META is hostile.
+TEST(Info, SaysWhatQualitiesErrAndGain) {
+  Image scene = full_cells_scene();
+  EXPECT_EQ(summary_text(summarize(encode(scene), "cells", uint64_t{1} << 26), "").find("% wrong"),
+            std::string::npos);
+  scene.meta = R"({"qualities": {
+      "fast": {"wrong_percent": 1.25, "depth_error_percent_of_diagonal": 0.5,
+               "ambient_occlusion_error_percent": 3, "light_error_percent": 4,
+               "estimated_times_exact_rays": {"vulkan": 2.5, "cpu": 1.75}},
+      "balanced": {"wrong_percent": "none", "light_error_percent": 1e300, "estimated_times_exact_rays": 7}}})";
+  const std::string text = summary_text(summarize(encode(scene), "cells", uint64_t{1} << 26), "");
+  EXPECT_NE(
+      text.find("fast        1.2 % wrong, depth off by 0.5 %, ambient occlusion by 3.0 %, light by 4.0 %; "
+                "about 2.5x exact rays on Vulkan, 1.8x on the CPU\n"),
+      std::string::npos)
+      << text;
+  EXPECT_NE(text.find("balanced    ? % wrong, depth off by ? %, ambient occlusion by ? %, light by 1e+300 %; "
+                      "about ?x exact rays on Vulkan, ?x on the CPU\n"),
+            std::string::npos)
+      << text;
+}
+
 TEST(Info, SaysWhatWideNodesAre) {
   const auto json = summarize(encode(full_wide_scene()), "wide", uint64_t{1} << 26);
   EXPECT_EQ(json["format"], "2.3");

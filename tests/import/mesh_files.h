@@ -13,21 +13,12 @@
 
 #include "import/import.h"
 #include "lsp/program.h"
+#include "temporary_folder.h"
 
 namespace lsp_test {
 
 class MeshFiles : public ::testing::Test {
  protected:
-  MeshFiles() {
-    std::string name = (std::filesystem::temp_directory_path() / "lsp_import_XXXXXX").string();
-    if (!mkdtemp(name.data())) throw std::runtime_error("no temporary folder");
-    folder_ = name;
-  }
-  ~MeshFiles() override {
-    std::error_code ignored;
-    std::filesystem::remove_all(folder_, ignored);
-  }
-
   std::filesystem::path write(const std::string& name, const std::string& bytes) const {
     std::ofstream(folder_ / name, std::ios::binary) << bytes;
     return folder_ / name;
@@ -52,7 +43,8 @@ class MeshFiles : public ::testing::Test {
     return {};
   }
 
-  std::filesystem::path folder_;
+  const lsp::test::TemporaryFolder temporary_;
+  const std::filesystem::path folder_ = temporary_.path();
 };
 
 // A triangle's corner in world space.

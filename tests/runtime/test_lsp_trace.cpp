@@ -1,7 +1,5 @@
 // lsp-trace as its users run it: options, files, figures and exit codes.
 #include <gtest/gtest.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <cstring>
 #include <filesystem>
@@ -10,22 +8,16 @@
 
 #include "lsp/instances.hpp"
 #include "scene_builder.h"
+#include "shell.h"
 
 namespace lsp::test {
 namespace {
 
 namespace fs = std::filesystem;
 
-std::string read_file(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
 class LspTrace : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::temp_directory_path() / ("lsp_test_trace_" + std::to_string(getpid()));
-    fs::create_directory(folder_);
     const Parts parts = build_parts({});
     raw_ = write_raw(parts);
     write("raw.lsp", raw_.data(), raw_.size());
@@ -42,8 +34,6 @@ class LspTrace : public testing::Test {
     rays_[99].tmin = 2e30f;
     write("rays.bin", rays_.data(), rays_.size() * sizeof(LspRay));
   }
-  void TearDown() override { fs::remove_all(folder_); }
-
   void write(const char* name, const void* data, size_t bytes) {
     std::ofstream(folder_ / name, std::ios::binary)
         .write(static_cast<const char*>(data), static_cast<std::streamsize>(bytes));
@@ -51,13 +41,10 @@ class LspTrace : public testing::Test {
 
   // Runs "lsp-trace ARGUMENTS" in the folder; output and errors are left in out.txt and err.txt.
   int run(const std::string& arguments) {
-    const std::string command =
-        "cd '" + folder_.string() + "' && '" LSP_TRACE_PROGRAM "' " + arguments + " > out.txt 2> err.txt";
-    const int status = std::system(command.c_str());
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    return shell("lsp-trace " + arguments + " > out.txt 2> err.txt", folder_);
   }
-  std::string out() { return read_file(folder_ / "out.txt"); }
-  std::string err() { return read_file(folder_ / "err.txt"); }
+  std::string out() { return read_bytes(folder_ / "out.txt"); }
+  std::string err() { return read_bytes(folder_ / "err.txt"); }
 
   std::vector<LspHit> expected(uint32_t flags, lsp_trace_counts* counts) {
     lsp_scene scene;
@@ -68,12 +55,13 @@ class LspTrace : public testing::Test {
     return hits;
   }
   void expect_hits(const std::vector<LspHit>& hits) {
-    const std::string got = read_file(folder_ / "hits.bin");
+    const std::string got = read_bytes(folder_ / "hits.bin");
     ASSERT_EQ(got.size(), hits.size() * sizeof(LspHit));
     EXPECT_EQ(memcmp(got.data(), hits.data(), got.size()), 0);
   }
 
-  fs::path folder_;
+  const TemporaryFolder temporary_;
+  const fs::path folder_ = temporary_.path();
   Bytes raw_;
   std::vector<LspRay> rays_;
 };
@@ -170,7 +158,7 @@ TEST_F(LspTrace, FilesWithoutWhatIsAskedFor) {
 TEST_F(LspTrace, FailureLeavesOldHits) {
   write("hits.bin", "old", 3);
   EXPECT_EQ(run(std::string("missing.lsp") + kFiles), 2);
-  EXPECT_EQ(read_file(folder_ / "hits.bin"), "old");
+  EXPECT_EQ(read_bytes(folder_ / "hits.bin"), "old");
   for (const auto& entry : fs::directory_iterator(folder_)) {
     EXPECT_EQ(entry.path().string().find(".tmp"), std::string::npos) << entry.path();
   }
@@ -229,12 +217,12 @@ TEST_F(LspTrace, VulkanTracesInstances) {
     SCOPED_TRACE(how);
     ASSERT_EQ(run(std::string("scene.json --json") + kFiles + how), 0) << err();
     const nlohmann::json cpu = nlohmann::json::parse(out());
-    const std::string hits = read_file(folder_ / "hits.bin");
+    const std::string hits = read_bytes(folder_ / "hits.bin");
     fs::remove(folder_ / "hits.bin");
     const int code = run(std::string("scene.json --json --repeat 2 --backend vulkan") + kFiles + how);
     if (code == 5) GTEST_SKIP() << err();
     ASSERT_EQ(code, 0) << err();
-    EXPECT_EQ(read_file(folder_ / "hits.bin"), hits);
+    EXPECT_EQ(read_bytes(folder_ / "hits.bin"), hits);
     const nlohmann::json json = nlohmann::json::parse(out());
     for (const char* same : {"instances", "assets", "mode", "rays", "invalid", "hits", "nodes_per_ray",
                              "shafts_per_ray", "triangles_per_ray", "bytes_mapped"})

@@ -1,7 +1,5 @@
 // The view that lsp-render chooses for a scene that nobody has seen yet.
 #include <gtest/gtest.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <array>
 #include <cstdio>
@@ -11,14 +9,10 @@
 
 #include "camera.h"
 #include "exposure.h"
+#include "shell.h"
 
 namespace lsp::sample {
 namespace {
-
-int run(const std::string& command) {
-  const int status = std::system((std::string(LSP_BIN_DIR) + "/" + command).c_str());
-  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-}
 
 // An .obj file in the making.
 class Mesh {
@@ -133,17 +127,11 @@ class Mesh {
 
 class DefaultView : public ::testing::Test {
  protected:
-  DefaultView()
-      : folder_(std::filesystem::temp_directory_path() / ("lsp_view_" + std::to_string(::getpid()))) {
-    std::filesystem::create_directories(folder_);
-  }
-  ~DefaultView() override { std::filesystem::remove_all(folder_); }
-
   void bake(const Mesh& mesh, const std::string& name = "mesh.obj") {
     if (name == "mesh.obj") std::ofstream(folder_ / name) << mesh.text();
     if (name == "mesh.stl") std::ofstream(folder_ / name) << mesh.stl();
     if (name == "mesh.gltf") write_gltf(mesh.soup());
-    ASSERT_EQ(run("lsp-bake " + file(name) + " -o " + file("mesh.lsp") + " --base wide --quiet"), 0);
+    ASSERT_EQ(test::shell("lsp-bake " + file(name) + " -o " + file("mesh.lsp") + " --base wide --quiet"), 0);
   }
   void write_gltf(const std::vector<glm::vec3>& soup) {
     const size_t bytes = soup.size() * sizeof soup[0];
@@ -159,11 +147,11 @@ class DefaultView : public ::testing::Test {
         {"nodes", {{{"mesh", 0}}}}};
   }
   nlohmann::json render(const std::string& options = "") {
-    EXPECT_EQ(
-        run("lsp-render " + file("mesh.lsp") + " -o " + file("x.png") + " -o " + file("x.pfm") +
-            " --size 64x36 --json " + (options.find("--samples") == options.npos ? "--samples 4 " : "") +
-            options + " > " + file("out") + " 2> " + file("err")),
-        0);
+    EXPECT_EQ(test::shell("lsp-render " + file("mesh.lsp") + " -o " + file("x.png") + " -o " + file("x.pfm") +
+                          " --size 64x36 --json " +
+                          (options.find("--samples") == options.npos ? "--samples 4 " : "") + options +
+                          " > " + file("out") + " 2> " + file("err")),
+              0);
     std::ifstream out(folder_ / "out");
     return nlohmann::json::parse(out);
   }
@@ -173,13 +161,11 @@ class DefaultView : public ::testing::Test {
         std::sscanf(report.at("camera").get<std::string>().c_str(), "%f,%f,%f:", &eye.x, &eye.y, &eye.z), 3);
     return eye;
   }
-  std::string errors() const {
-    std::ifstream err(folder_ / "err");
-    return {std::istreambuf_iterator<char>(err), {}};
-  }
+  std::string errors() const { return test::read_bytes(folder_ / "err"); }
   std::string file(const std::string& name) const { return (folder_ / name).string(); }
 
-  std::filesystem::path folder_;
+  const test::TemporaryFolder temporary_;
+  const std::filesystem::path folder_ = temporary_.path();
 };
 
 TEST_F(DefaultView, AnObjectFillsThePicture) {
@@ -307,7 +293,8 @@ TEST_F(DefaultView, FindsAndTakesTheAxisThatIsUp) {
   EXPECT_EQ(errors().find("taken to be up"), std::string::npos) << errors();
   EXPECT_EQ(render("--camera 0,0,9:5,5,0:60").at("up"), "y") << "who says where says how";
   EXPECT_EQ(render("--camera 0,0,9:5,5,0:60 --up z").at("up"), "z");
-  EXPECT_EQ(run("lsp-render " + file("mesh.lsp") + " -o " + file("x.png") + " --up w 2>/dev/null"), 1);
+  EXPECT_EQ(test::shell("lsp-render " + file("mesh.lsp") + " -o " + file("x.png") + " --up w 2>/dev/null"),
+            1);
   Mesh terrain;
   terrain.add_terrain(0.5f, false);
   bake(terrain);
@@ -396,8 +383,8 @@ TEST_F(DefaultView, ExposureBringsDarkPicturesIntoRange) {
   const double dark = render(inside + "--exposure auto --effect direct --samples 64").at("exposure");
   EXPECT_GT(dark, 1.0);
   for (const char* bad : {"bright", "1x", "21", "nan"}) {
-    EXPECT_EQ(run("lsp-render " + file("mesh.lsp") + " -o " + file("x.png") + " --exposure " + bad +
-                  " 2>/dev/null"),
+    EXPECT_EQ(test::shell("lsp-render " + file("mesh.lsp") + " -o " + file("x.png") + " --exposure " + bad +
+                          " 2>/dev/null"),
               1)
         << bad;
   }

@@ -1,7 +1,6 @@
 // Leaves with and without their masks: the light that a baked grove lets through against the light that
 // passes the leaves' own texels.
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -12,16 +11,12 @@
 #include "picture.h"
 #include "render_scene.h"
 #include "scene.h"
+#include "shell.h"
 
 namespace lsp::sample {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-
-int run(const std::string& command) {
-  const int status = std::system((std::string(LSP_BIN_DIR) + "/" + command).c_str());
-  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-}
 
 // A grove of few triangles, baked with its masks and without.
 class Grove : public ::testing::Test {
@@ -31,9 +26,12 @@ class Grove : public ::testing::Test {
     std::filesystem::create_directories(folder_);
     for (const std::string masks : {"", "--no-masks"}) {
       const std::string name = file(masks.empty() ? "masked" : "solid");
-      ASSERT_EQ(run("lsp-sample-scene " + name + ".glb --quiet --scene grove --triangles 5000 " + masks), 0);
-      ASSERT_EQ(run("lsp-bake " + name + ".glb -o " + name + ".lsp --quiet --resolution 4 --depth 6"), 0);
-      ASSERT_EQ(run("lsp-validate " + name + ".lsp"), 0);
+      ASSERT_EQ(
+          test::shell("lsp-sample-scene " + name + ".glb --quiet --scene grove --triangles 5000 " + masks),
+          0);
+      ASSERT_EQ(test::shell("lsp-bake " + name + ".glb -o " + name + ".lsp --quiet --resolution 4 --depth 6"),
+                0);
+      ASSERT_EQ(test::shell("lsp-validate " + name + ".lsp"), 0);
     }
   }
   static void TearDownTestSuite() { std::filesystem::remove_all(folder_); }
@@ -41,8 +39,8 @@ class Grove : public ::testing::Test {
   static std::string file(const std::string& name) { return (folder_ / name).string(); }
 
   static Picture render(const std::string& scene, const std::string& options) {
-    EXPECT_EQ(run("lsp-render " + file(scene + ".lsp") + " -o " + file("picture.pfm") +
-                  " --quiet --size 48x32 --samples 16 " + options),
+    EXPECT_EQ(test::shell("lsp-render " + file(scene + ".lsp") + " -o " + file("picture.pfm") +
+                          " --quiet --size 48x32 --samples 16 " + options),
               0);
     return read_pfm(file("picture.pfm"));
   }
@@ -187,8 +185,9 @@ TEST_F(Grove, AnEmitterThatIsThereInPartShinesInPart) {
            "v -1 4 -1\nv 1 4 -1\nv 1 4 1\nv -1 4 1\n"
            "usemtl floor\nf 1 2 3 4\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 1 4 8 5\nf 2 3 7 6\n"
            "usemtl lamp\nf 9 10 11 12\n";
-    ASSERT_EQ(run("lsp-bake " + file("lamp.obj") + " -o " + file("lamp.lsp") + " --quiet --no-line-spaces"),
-              0);
+    ASSERT_EQ(
+        test::shell("lsp-bake " + file("lamp.obj") + " -o " + file("lamp.lsp") + " --quiet --no-line-spaces"),
+        0);
     light[part] = mean(render("lamp", "--effect direct --camera 0,2,0:0,0,0.1:60"));
   }
   EXPECT_GT(light[0], 0.1);

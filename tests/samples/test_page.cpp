@@ -1,4 +1,5 @@
 // The demo's page stands alone and holds the figures it is given.
+#include "html_text.h"
 #include "page.h"
 
 #include <gtest/gtest.h>
@@ -48,6 +49,7 @@ TEST(Page, Base64) {
   EXPECT_EQ(base64("foo"), "Zm9v");
   EXPECT_EQ(base64("foobar"), "Zm9vYmFy");
   EXPECT_EQ(base64(std::string("\xff\xfe\xfd", 3)), "//79");
+  EXPECT_EQ(base64(std::string("\xff\xfe\xfd\x00", 4)), "//79AA==");
 }
 
 TEST(Page, StandsAlone) {

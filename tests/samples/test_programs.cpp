@@ -1,6 +1,5 @@
 // The sample programs as a user runs them: scene, bake, render, compare.
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -13,22 +12,10 @@
 #include "compare.h"
 #include "lsp/vulkan_device.hpp"
 #include "scene.h"
+#include "shell.h"
 
 namespace lsp::sample {
 namespace {
-
-// Runs a program of the build with its output in files; returns its exit code.
-int run(const std::string& command) {
-  const int status = std::system((std::string(LSP_BIN_DIR) + "/" + command).c_str());
-  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-}
-
-std::string read(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream bytes;
-  bytes << file.rdbuf();
-  return bytes.str();
-}
 
 // A folder with a small baked scene, made once.
 class Programs : public ::testing::Test {
@@ -37,11 +24,13 @@ class Programs : public ::testing::Test {
     folder_ = std::filesystem::temp_directory_path() / ("lsp_samples_" + std::to_string(::getpid()));
     std::filesystem::create_directories(folder_);
     for (const char* scene : {"spheres", "plane"}) {
-      ASSERT_EQ(run("lsp-sample-scene " + file(scene) + ".glb --quiet --triangles 8000 --scene " + scene), 0);
       ASSERT_EQ(
-          run("lsp-bake " + file(scene) + ".glb -o " + file(scene) + ".lsp --quiet --resolution 4 --depth 6"),
+          test::shell("lsp-sample-scene " + file(scene) + ".glb --quiet --triangles 8000 --scene " + scene),
           0);
-      ASSERT_EQ(run("lsp-validate " + file(scene) + ".lsp"), 0);
+      ASSERT_EQ(test::shell("lsp-bake " + file(scene) + ".glb -o " + file(scene) +
+                            ".lsp --quiet --resolution 4 --depth 6"),
+                0);
+      ASSERT_EQ(test::shell("lsp-validate " + file(scene) + ".lsp"), 0);
     }
   }
   static void TearDownTestSuite() { std::filesystem::remove_all(folder_); }
@@ -51,17 +40,19 @@ class Programs : public ::testing::Test {
   // atrium.lsp, in few cells.
   static void bake_hall() {
     if (std::filesystem::exists(file("atrium.lsp"))) return;
-    ASSERT_EQ(run("lsp-sample-scene " + file("atrium.glb") + " --quiet --triangles 14056 --scene atrium"), 0);
-    ASSERT_EQ(run("lsp-bake " + file("atrium.glb") + " -o " + file("atrium.lsp") +
-                  " --preset fast --cells 4 --quiet"),
+    ASSERT_EQ(
+        test::shell("lsp-sample-scene " + file("atrium.glb") + " --quiet --triangles 14056 --scene atrium"),
+        0);
+    ASSERT_EQ(test::shell("lsp-bake " + file("atrium.glb") + " -o " + file("atrium.lsp") +
+                          " --preset fast --cells 4 --quiet"),
               0);
   }
 
   // Renders `scene` into NAME.pfm and reads it back.
   static Picture render(const std::string& scene, const std::string& name, const std::string& options,
                         int samples = 4) {
-    EXPECT_EQ(run("lsp-render " + file(scene) + ".lsp -o " + file(name) +
-                  ".pfm --quiet --size 64x36 --samples " + std::to_string(samples) + " " + options),
+    EXPECT_EQ(test::shell("lsp-render " + file(scene) + ".lsp -o " + file(name) +
+                          ".pfm --quiet --size 64x36 --samples " + std::to_string(samples) + " " + options),
               0);
     return read_pfm(file(name) + ".pfm");
   }
@@ -76,7 +67,7 @@ TEST_F(Programs, PictureDoesNotDependOnThreads) {
     const std::string options = std::string("--bounces 2 --denoise --mode ") + mode;
     render("spheres", "one", options + " --threads 1");
     render("spheres", "three", options + " --threads 3");
-    EXPECT_EQ(read(file("one.pfm")), read(file("three.pfm"))) << mode;
+    EXPECT_EQ(test::read_bytes(file("one.pfm")), test::read_bytes(file("three.pfm"))) << mode;
   }
 }
 
@@ -135,8 +126,8 @@ TEST_F(Programs, InstancesAreRendered) {
   write("two.json", here + ", " + beside);
   write("hidden.json", here + ", " + beside.substr(0, beside.size() - 1) + R"(, "mask": 0})");
   const auto picture = [](const std::string& scene, const std::string& options) {
-    EXPECT_EQ(run("lsp-render " + file(scene) + " -o " + file("p.pfm") +
-                  " --quiet --size 64x36 --samples 8 --camera 4,3,6:0,0.5,0:45 " + options),
+    EXPECT_EQ(test::shell("lsp-render " + file(scene) + " -o " + file("p.pfm") +
+                          " --quiet --size 64x36 --samples 8 --camera 4,3,6:0,0.5,0:45 " + options),
               0);
     return read_pfm(file("p.pfm"));
   };
@@ -159,16 +150,17 @@ TEST_F(Programs, InstancesAreRendered) {
   for (const std::string mode : {"exact", "approximate"}) {
     if (!VulkanTracer::available(&why)) continue;  // VulkanGivesTheSamePicture says so
     picture("halls.json", "--mode " + mode);
-    const std::string cpu = read(file("p.pfm"));
+    const std::string cpu = test::read_bytes(file("p.pfm"));
     picture("halls.json", "--backend vulkan --mode " + mode);
-    EXPECT_EQ(read(file("p.pfm")), cpu) << mode;
+    EXPECT_EQ(test::read_bytes(file("p.pfm")), cpu) << mode;
     // No shader of instances walks a BVH.
-    EXPECT_EQ(run("lsp-render " + file("two.json") + " -o " + file("p.pfm") + " --quiet --backend vulkan"),
-              5);
+    EXPECT_EQ(
+        test::shell("lsp-render " + file("two.json") + " -o " + file("p.pfm") + " --quiet --backend vulkan"),
+        5);
   }
   write("bad.json", "{}");
-  EXPECT_EQ(run("lsp-render " + file("bad.json") + " -o " + file("p.pfm") + " --quiet"), 3);
-  EXPECT_EQ(run("lsp-render " + file("none.json") + " -o " + file("p.pfm") + " --quiet"), 2);
+  EXPECT_EQ(test::shell("lsp-render " + file("bad.json") + " -o " + file("p.pfm") + " --quiet"), 3);
+  EXPECT_EQ(test::shell("lsp-render " + file("none.json") + " -o " + file("p.pfm") + " --quiet"), 2);
 }
 
 // Rays that go on from a table's plane begin in front of the surface (lsp_hit_offset): from behind it they
@@ -179,7 +171,8 @@ TEST_F(Programs, BouncesFromTablesAreNoDarker) {
     for (const glm::vec3& pixel : picture.pixels) sum += glm::dvec3(pixel);
     return (sum.x + sum.y + sum.z) / static_cast<double>(3 * picture.pixels.size());
   };
-  ASSERT_EQ(run("lsp-bake " + file("spheres.glb") + " -o " + file("fine.lsp") + " --base bvh --quiet"), 0);
+  ASSERT_EQ(
+      test::shell("lsp-bake " + file("spheres.glb") + " -o " + file("fine.lsp") + " --base bvh --quiet"), 0);
   const double exact = mean(render("fine", "exact", "--effect diffuse", 512));
   const double approximate = mean(render("fine", "tables", "--effect diffuse --mode approximate", 512));
   EXPECT_NEAR(approximate, exact, 0.035 * exact);
@@ -191,7 +184,7 @@ TEST_F(Programs, VulkanGivesTheSamePicture) {
   for (const char* mode : {"exact", "approximate"}) {
     render("spheres", "cpu", std::string("--mode ") + mode);
     render("spheres", "vulkan", std::string("--backend vulkan --mode ") + mode);
-    EXPECT_EQ(read(file("cpu.pfm")), read(file("vulkan.pfm"))) << mode;
+    EXPECT_EQ(test::read_bytes(file("cpu.pfm")), test::read_bytes(file("vulkan.pfm"))) << mode;
   }
 }
 
@@ -200,9 +193,9 @@ TEST_F(Programs, VulkanGivesTheSamePicture) {
 TEST_F(Programs, VerifiedPathsMakeTheMeanExact) {
   bake_hall();
   const auto picture = [](const std::string& options, int samples) {
-    EXPECT_EQ(run("lsp-render " + file("atrium.lsp") + " -o " + file("p.pfm") +
-                  " --quiet --size 24x14 --camera=-7.9,1.5,-0.9:3,3.1,0.35:66 --samples " +
-                  std::to_string(samples) + " " + options),
+    EXPECT_EQ(test::shell("lsp-render " + file("atrium.lsp") + " -o " + file("p.pfm") +
+                          " --quiet --size 24x14 --camera=-7.9,1.5,-0.9:3,3.1,0.35:66 --samples " +
+                          std::to_string(samples) + " " + options),
               0);
     return read_pfm(file("p.pfm"));
   };
@@ -233,29 +226,30 @@ TEST_F(Programs, VerifyIsTheSameWhereverItRuns) {
   const std::string options = "--mode approximate --bounces 2 --verify 25 --denoise";
   render("spheres", "one", options + " --threads 1");
   render("spheres", "three", options + " --threads 3");
-  EXPECT_EQ(read(file("one.pfm")), read(file("three.pfm")));
+  EXPECT_EQ(test::read_bytes(file("one.pfm")), test::read_bytes(file("three.pfm")));
   std::string why;
   if (!VulkanTracer::available(&why)) GTEST_SKIP() << "no Vulkan device: " << why;
   for (const std::string effect : {"all", "ao"}) {
     render("spheres", "cpu", options + " --effect " + effect);
     render("spheres", "vulkan", options + " --backend vulkan --effect " + effect);
-    EXPECT_EQ(read(file("cpu.pfm")), read(file("vulkan.pfm"))) << effect;
+    EXPECT_EQ(test::read_bytes(file("cpu.pfm")), test::read_bytes(file("vulkan.pfm"))) << effect;
   }
 }
 
 TEST_F(Programs, VerifyIsAShareOfPathsAndSaysWhereItDoesNothing) {
   const std::string command =
       "lsp-render " + file("spheres.lsp") + " -o " + file("x.pfm") + " --size 64x36 --samples 16 ";
-  ASSERT_EQ(run(command + "--mode approximate --verify 12.5 --json > " + file("x.json")), 0);
-  const nlohmann::json report = nlohmann::json::parse(read(file("x.json")));
+  ASSERT_EQ(test::shell(command + "--mode approximate --verify 12.5 --json > " + file("x.json")), 0);
+  const nlohmann::json report = nlohmann::json::parse(test::read_bytes(file("x.json")));
   const double paths = report.at("paths").get<double>();
   EXPECT_GT(paths, 1000);
   EXPECT_NEAR(report.at("verified_paths").get<double>() / paths, 0.125, 0.025);
   for (const char* value : {"-1", "101", "all"})
-    EXPECT_EQ(run(command + "--mode approximate --verify " + value + " >/dev/null 2>&1"), 1) << value;
+    EXPECT_EQ(test::shell(command + "--mode approximate --verify " + value + " >/dev/null 2>&1"), 1) << value;
   for (const char* elsewhere : {"--mode exact", "--mode approximate --heat loss"}) {
-    ASSERT_EQ(run(command + "--verify 10 " + elsewhere + " >/dev/null 2> " + file("notes.txt")), 0);
-    EXPECT_NE(read(file("notes.txt")).find("--verify does nothing"), std::string::npos) << elsewhere;
+    ASSERT_EQ(test::shell(command + "--verify 10 " + elsewhere + " >/dev/null 2> " + file("notes.txt")), 0);
+    EXPECT_NE(test::read_bytes(file("notes.txt")).find("--verify does nothing"), std::string::npos)
+        << elsewhere;
   }
 }
 
@@ -278,14 +272,16 @@ TEST_F(Programs, RaysToLightsHaveAQualityOfTheirOwn) {
   EXPECT_GT(mixed, balanced);
   EXPECT_LT(mixed, fast);
   EXPECT_LT(off("--quality balanced --light-quality exact"), balanced);
-  EXPECT_EQ(run("lsp-render " + file("atrium.lsp") + " -o " + file("x.pfm") +
-                " --mode approximate --light-quality best >/dev/null 2>&1"),
+  EXPECT_EQ(test::shell("lsp-render " + file("atrium.lsp") + " -o " + file("x.pfm") +
+                        " --mode approximate --light-quality best >/dev/null 2>&1"),
             1);
   for (const char* elsewhere : {"--mode exact", "--mode approximate --effect ao"}) {
-    ASSERT_EQ(run("lsp-render " + file("atrium.lsp") + " -o " + file("x.pfm") +
-                  " --size 8x8 --light-quality fast " + elsewhere + " >/dev/null 2> " + file("notes.txt")),
-              0);
-    EXPECT_NE(read(file("notes.txt")).find("--light-quality does nothing"), std::string::npos) << elsewhere;
+    ASSERT_EQ(
+        test::shell("lsp-render " + file("atrium.lsp") + " -o " + file("x.pfm") +
+                    " --size 8x8 --light-quality fast " + elsewhere + " >/dev/null 2> " + file("notes.txt")),
+        0);
+    EXPECT_NE(test::read_bytes(file("notes.txt")).find("--light-quality does nothing"), std::string::npos)
+        << elsewhere;
   }
 }
 
@@ -294,11 +290,11 @@ TEST_F(Programs, DevicesGetThePictureInPieces) {
   std::string why;
   if (!VulkanTracer::available(&why)) GTEST_SKIP() << "no Vulkan device: " << why;
   const auto report = [](const std::string& options) {
-    EXPECT_EQ(
-        run("lsp-render " + file("spheres.lsp") + " -o " + file("x.pfm") +
-            " --camera 0,1,0.1:0,0,0:100 --effect ao --samples 1 --json " + options + " > " + file("x.json")),
-        0);
-    return nlohmann::json::parse(read(file("x.json")));
+    EXPECT_EQ(test::shell("lsp-render " + file("spheres.lsp") + " -o " + file("x.pfm") +
+                          " --camera 0,1,0.1:0,0,0:100 --effect ao --samples 1 --json " + options + " > " +
+                          file("x.json")),
+              0);
+    return nlohmann::json::parse(test::read_bytes(file("x.json")));
   };
   // 131,584 pixels: two pieces, for primary rays and for those of ambient occlusion, and one ray to try the
   // device.
@@ -325,49 +321,54 @@ TEST_F(Programs, HeatIsWhereTablesLoseAndWorkGoes) {
       render("spheres", "approximate", "--heat steps --mode approximate --near approximate");
   EXPECT_GT(total(exact), total(approximate));
   EXPECT_GT(total(render("spheres", "triangles", "--heat exact --mode exact")), 0.0);
-  EXPECT_EQ(run("lsp-render " + file("spheres.lsp") + " -o " + file("x.png") + " --heat cold --quiet"), 1);
+  EXPECT_EQ(
+      test::shell("lsp-render " + file("spheres.lsp") + " -o " + file("x.png") + " --heat cold --quiet"), 1);
 }
 
 TEST_F(Programs, CompareExitsWith7WhereTheyDiffer) {
   render("spheres", "a", "--effect direct");
   render("spheres", "b", "--effect ao");
-  EXPECT_EQ(run("lsp-compare --quiet --max-rmse 0 " + file("a.pfm") + " " + file("a.pfm")), 0);
-  EXPECT_EQ(run("lsp-compare --quiet --max-rmse 0 " + file("a.pfm") + " " + file("b.pfm") + " 2>/dev/null"),
-            7);
+  EXPECT_EQ(test::shell("lsp-compare --quiet --max-rmse 0 " + file("a.pfm") + " " + file("a.pfm")), 0);
+  EXPECT_EQ(
+      test::shell("lsp-compare --quiet --max-rmse 0 " + file("a.pfm") + " " + file("b.pfm") + " 2>/dev/null"),
+      7);
 }
 
 TEST_F(Programs, HelloTracesARay) {
-  ASSERT_EQ(run("hello " + file("plane.lsp") + " > " + file("hello.txt")), 0);
-  EXPECT_EQ(read(file("hello.txt")).rfind("hit triangle", 0), 0u) << read(file("hello.txt"));
-  EXPECT_EQ(run("hello " + file("missing.lsp") + " 2> " + file("hello.txt")), 2);
-  EXPECT_NE(read(file("hello.txt")).find("missing.lsp: "), std::string::npos);
+  ASSERT_EQ(test::shell("hello " + file("plane.lsp") + " > " + file("hello.txt")), 0);
+  EXPECT_EQ(test::read_bytes(file("hello.txt")).rfind("hit triangle", 0), 0u)
+      << test::read_bytes(file("hello.txt"));
+  EXPECT_EQ(test::shell("hello " + file("missing.lsp") + " 2> " + file("hello.txt")), 2);
+  EXPECT_NE(test::read_bytes(file("hello.txt")).find("missing.lsp: "), std::string::npos);
 }
 
 // Of tables and of wide nodes alone, which have another shader; the layers have nothing to say of it.
 TEST_F(Programs, HelloVulkanTracesTheSameRay) {
   std::string why;
   if (!VulkanTracer::available(&why)) GTEST_SKIP() << "no Vulkan device: " << why;
-  ASSERT_EQ(run("lsp-bake " + file("plane.glb") + " -o " + file("cells.lsp") + " --quiet --cells 6"), 0);
-  ASSERT_EQ(run("lsp-bake " + file("plane.glb") + " -o " + file("wide.lsp") + " --quiet --base wide"), 0);
+  ASSERT_EQ(test::shell("lsp-bake " + file("plane.glb") + " -o " + file("cells.lsp") + " --quiet --cells 6"),
+            0);
+  ASSERT_EQ(test::shell("lsp-bake " + file("plane.glb") + " -o " + file("wide.lsp") + " --quiet --base wide"),
+            0);
   for (const std::string scene : {"plane.lsp", "cells.lsp", "wide.lsp"}) {
     SCOPED_TRACE(scene);
-    ASSERT_EQ(run("hello " + file(scene) + " > " + file("hello.txt")), 0);
+    ASSERT_EQ(test::shell("hello " + file(scene) + " > " + file("hello.txt")), 0);
     setenv("VK_INSTANCE_LAYERS", "VK_LAYER_KHRONOS_validation", 1);
-    const int exit = run("hello_vulkan " + file(scene) + " > " + file("hello_vulkan.txt") + " 2>&1");
+    const int exit = test::shell("hello_vulkan " + file(scene) + " > " + file("hello_vulkan.txt") + " 2>&1");
     unsetenv("VK_INSTANCE_LAYERS");
-    const std::string said = read(file("hello_vulkan.txt"));
+    const std::string said = test::read_bytes(file("hello_vulkan.txt"));
     if (exit == 5 && said.find("LayerNotPresent") != std::string::npos) GTEST_SKIP() << said;
     ASSERT_EQ(exit, 0) << said;
-    const std::string cpu = read(file("hello.txt"));
+    const std::string cpu = test::read_bytes(file("hello.txt"));
     EXPECT_EQ(said, cpu.substr(0, cpu.find_first_of(",\n")) + "\n");
   }
-  EXPECT_EQ(run("hello_vulkan " + file("missing.lsp") + " 2>/dev/null"), 2);
+  EXPECT_EQ(test::shell("hello_vulkan " + file("missing.lsp") + " 2>/dev/null"), 2);
 }
 
 // They are read in a sitting.
 TEST_F(Programs, HellosAreShort) {
   const auto lines = [](const char* name) {
-    const std::string text = read(std::filesystem::path(LSP_SAMPLES_DIR) / "hello" / name);
+    const std::string text = test::read_bytes(std::filesystem::path(LSP_SAMPLES_DIR) / "hello" / name);
     return std::ranges::count(text, '\n');
   };
   EXPECT_LE(lines("hello.c"), 30);
@@ -378,38 +379,39 @@ TEST_F(Programs, ExitCodes) {
   const std::string quiet = " >/dev/null 2>&1";
   const std::string scene = file("spheres.lsp");
   for (const char* program : {"lsp-render", "lsp-compare", "lsp-sample-scene"}) {
-    EXPECT_EQ(run(program + std::string(" --help") + quiet), 0) << program;
-    EXPECT_EQ(run(program + std::string(" --version") + quiet), 0) << program;
-    EXPECT_EQ(run(program + std::string(" --no-such-option") + quiet), 1) << program;
+    EXPECT_EQ(test::shell(program + std::string(" --help") + quiet), 0) << program;
+    EXPECT_EQ(test::shell(program + std::string(" --version") + quiet), 0) << program;
+    EXPECT_EQ(test::shell(program + std::string(" --no-such-option") + quiet), 1) << program;
   }
-  EXPECT_EQ(run("lsp-render " + scene + " -o " + file("x.jpeg") + quiet), 1);
-  EXPECT_EQ(run("lsp-render " + scene + " -o " + file("x.png") + " --camera 1,2,3" + quiet), 1);
-  EXPECT_EQ(run("lsp-render " + scene + " -o " + file("x.png") + " --size 0x7" + quiet), 1);
-  EXPECT_EQ(run("lsp-render " + file("missing.lsp") + " -o " + file("x.png") + quiet), 2);
-  EXPECT_EQ(run("lsp-render " + scene + " -o /nonexistent/x.png --size 8x8 --samples 1" + quiet), 2);
-  EXPECT_EQ(run("lsp-render " + file("plane.glb") + " -o " + file("x.png") + quiet), 3);
-  ASSERT_EQ(run("lsp-bake " + file("spheres.glb") + " -o " + file("lean.lsp") +
-                " --quiet --resolution 4 --depth 6 --no-exact"),
+  EXPECT_EQ(test::shell("lsp-render " + scene + " -o " + file("x.jpeg") + quiet), 1);
+  EXPECT_EQ(test::shell("lsp-render " + scene + " -o " + file("x.png") + " --camera 1,2,3" + quiet), 1);
+  EXPECT_EQ(test::shell("lsp-render " + scene + " -o " + file("x.png") + " --size 0x7" + quiet), 1);
+  EXPECT_EQ(test::shell("lsp-render " + file("missing.lsp") + " -o " + file("x.png") + quiet), 2);
+  EXPECT_EQ(test::shell("lsp-render " + scene + " -o /nonexistent/x.png --size 8x8 --samples 1" + quiet), 2);
+  EXPECT_EQ(test::shell("lsp-render " + file("plane.glb") + " -o " + file("x.png") + quiet), 3);
+  ASSERT_EQ(test::shell("lsp-bake " + file("spheres.glb") + " -o " + file("lean.lsp") +
+                        " --quiet --resolution 4 --depth 6 --no-exact"),
             0);
-  EXPECT_EQ(run("lsp-render " + file("lean.lsp") + " -o " + file("x.png") + quiet), 5);
+  EXPECT_EQ(test::shell("lsp-render " + file("lean.lsp") + " -o " + file("x.png") + quiet), 5);
   EXPECT_FALSE(std::filesystem::exists(file("x.png")));
 }
 
 TEST_F(Programs, WithoutLineSpacesApproximateIsExact) {
-  ASSERT_EQ(run("lsp-bake " + file("spheres.glb") + " -o " + file("plain.lsp") + " --quiet --no-line-spaces"),
+  ASSERT_EQ(test::shell("lsp-bake " + file("spheres.glb") + " -o " + file("plain.lsp") +
+                        " --quiet --no-line-spaces"),
             0);
   render("plain", "exact", "--mode exact");
   render("plain", "approximate", "--mode approximate");
-  EXPECT_EQ(read(file("exact.pfm")), read(file("approximate.pfm")));
+  EXPECT_EQ(test::read_bytes(file("exact.pfm")), test::read_bytes(file("approximate.pfm")));
 }
 
 TEST_F(Programs, PackedFilesRenderTheSame) {
-  ASSERT_EQ(run("lsp-bake " + file("spheres.glb") + " -o " + file("packed.lsp") +
-                " --quiet --resolution 4 --depth 6 --compress zstd"),
+  ASSERT_EQ(test::shell("lsp-bake " + file("spheres.glb") + " -o " + file("packed.lsp") +
+                        " --quiet --resolution 4 --depth 6 --compress zstd"),
             0);
   render("spheres", "raw", "--mode approximate");
   render("packed", "unpacked", "--mode approximate");
-  EXPECT_EQ(read(file("raw.pfm")), read(file("unpacked.pfm")));
+  EXPECT_EQ(test::read_bytes(file("raw.pfm")), test::read_bytes(file("unpacked.pfm")));
 }
 
 }  // namespace

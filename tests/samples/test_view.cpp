@@ -19,6 +19,7 @@
 #include "controls.h"
 #include "exposure_meter.h"
 #include "lsp/vulkan_device.hpp"
+#include "shell.h"
 #include "viewer.h"
 
 #define STB_IMAGE_IMPLEMENTATION
@@ -76,18 +77,6 @@ class Xvfb {
   std::string display_;
 };
 
-int run(const std::string& command) {
-  const int status = std::system((std::string(LSP_BIN_DIR) + "/" + command).c_str());
-  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-}
-
-std::string read(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream bytes;
-  bytes << file.rdbuf();
-  return bytes.str();
-}
-
 using Shot = Viewer::Screenshot;
 
 Shot read_png(const std::string& path) {
@@ -130,15 +119,15 @@ class View : public testing::Test {
     std::ofstream(file("corner.obj")) << "v 0 0 0\nv 4 0 0\nv 4 0 4\nv 0 0 4\nv 0 3 0\nv 4 3 0\nv 0 3 4\n"
                                          "f 4 3 2 1\nf 1 2 6 5\nf 1 5 7 4\n";
     const std::string mesh = file("s.glb");
-    ASSERT_EQ(run("lsp-sample-scene " + mesh + " --quiet --triangles 8000 --scene spheres"), 0);
-    ASSERT_EQ(run("lsp-bake " + mesh + " -o " + file("cells.lsp") +
-                  " --quiet --base cells --cells 12 --preset fast"),
+    ASSERT_EQ(test::shell("lsp-sample-scene " + mesh + " --quiet --triangles 8000 --scene spheres"), 0);
+    ASSERT_EQ(test::shell("lsp-bake " + mesh + " -o " + file("cells.lsp") +
+                          " --quiet --base cells --cells 12 --preset fast"),
               0);
-    ASSERT_EQ(
-        run("lsp-bake " + mesh + " -o " + file("bvh.lsp") + " --quiet --base bvh --resolution 4 --depth 3,6"),
-        0);
-    ASSERT_EQ(run("lsp-bake " + mesh + " -o " + file("ntree.lsp") + " --quiet --base ntree"), 0);
-    ASSERT_EQ(run("lsp-bake " + mesh + " -o " + file("wide.lsp") + " --quiet --base wide"), 0);
+    ASSERT_EQ(test::shell("lsp-bake " + mesh + " -o " + file("bvh.lsp") +
+                          " --quiet --base bvh --resolution 4 --depth 3,6"),
+              0);
+    ASSERT_EQ(test::shell("lsp-bake " + mesh + " -o " + file("ntree.lsp") + " --quiet --base ntree"), 0);
+    ASSERT_EQ(test::shell("lsp-bake " + mesh + " -o " + file("wide.lsp") + " --quiet --base wide"), 0);
     // One moved by its origin, one mirrored and stretched, of cells and of wide nodes; and one that is a BVH.
     write_scene("placed.json", R"(["cells.lsp", "wide.lsp"])");
     write_scene("refused.json", R"(["cells.lsp", "bvh.lsp"])");
@@ -162,9 +151,9 @@ class View : public testing::Test {
 
   // Runs lsp-view in a small window near the spheres; its report is in report_.
   int view(const std::string& arguments) {
-    const int exit = run("lsp-view --json --size 160x90 --camera 9,7,14:0,1,0:40 " + arguments + " > " +
-                         file("report.json"));
-    report_ = exit == 0 ? nlohmann::json::parse(read(file("report.json"))) : nlohmann::json{};
+    const int exit = test::shell("lsp-view --json --size 160x90 --camera 9,7,14:0,1,0:40 " + arguments +
+                                 " > " + file("report.json"));
+    report_ = exit == 0 ? nlohmann::json::parse(test::read_bytes(file("report.json"))) : nlohmann::json{};
     return exit;
   }
   Shot shot(const std::string& scene, const std::string& arguments) {
@@ -224,8 +213,8 @@ TEST_F(View, AmbientOcclusionIsThatOfLspRender) {
   for (const std::string scene : {"cells.lsp", "placed.json"})
     for (const std::string mode : {"exact", "approximate"}) {
       const Shot seen = shot(scene, options + "--split " + (mode == "exact" ? "1" : "0"));
-      ASSERT_EQ(run("lsp-render " + file(scene) + " -o " + file("r.png") + " --quiet --samples 4 " +
-                    "--size 160x90 --camera 9,7,14:0,1,0:40 --mode " + mode + " " + options),
+      ASSERT_EQ(test::shell("lsp-render " + file(scene) + " -o " + file("r.png") + " --quiet --samples 4 " +
+                            "--size 160x90 --camera 9,7,14:0,1,0:40 --mode " + mode + " " + options),
                 0);
       const Difference off = difference(seen, read_png(file("r.png")), 0, kWidth);
       // Sines and cosines differ in their last bits: a few rays hit another thing.
@@ -239,8 +228,8 @@ TEST_F(View, StartsApproximateAndWellExposed) {
   for (const std::string scene : {"cells.lsp", "placed.json", "wide.lsp"}) {
     SCOPED_TRACE(scene);
     const auto json_of = [&](const std::string& command) {
-      EXPECT_EQ(run(command + quiet + "--json > " + file("report.json")), 0);
-      return nlohmann::json::parse(read(file("report.json")));
+      EXPECT_EQ(test::shell(command + quiet + "--json > " + file("report.json")), 0);
+      return nlohmann::json::parse(test::read_bytes(file("report.json")));
     };
     const nlohmann::json seen = json_of("lsp-view " + file(scene) + " --frames 1");
     const nlohmann::json rendered = json_of("lsp-render " + file(scene) + " --samples 4 -o " + file("r.png"));
@@ -255,8 +244,8 @@ TEST_F(View, StartsApproximateAndWellExposed) {
   ASSERT_EQ(view(file("cells.lsp") + " --quiet --frames 1"), 0);
   EXPECT_EQ(report_["exposure"], 0);
   std::ofstream(file("dark.mtl")) << "newmtl dark\nKd 0.01 0.01 0.01\n";
-  std::ofstream(file("dark.obj")) << "mtllib dark.mtl\nusemtl dark\n" << read(file("corner.obj"));
-  ASSERT_EQ(run("lsp-bake " + file("dark.obj") + " -o " + file("dark.lsp") + " --quiet"), 0);
+  std::ofstream(file("dark.obj")) << "mtllib dark.mtl\nusemtl dark\n" << test::read_bytes(file("corner.obj"));
+  ASSERT_EQ(test::shell("lsp-bake " + file("dark.obj") + " -o " + file("dark.lsp") + " --quiet"), 0);
   ASSERT_EQ(view(file("dark.lsp") + " --quiet --frames 1 --exposure auto"), 0);
   EXPECT_GT(report_["exposure"], 0.5);
 }
@@ -264,7 +253,7 @@ TEST_F(View, StartsApproximateAndWellExposed) {
 // A line says what cannot be shown, and of which asset.
 TEST_F(View, SaysWhatCannotBeShown) {
   EXPECT_EQ(view(file("refused.json") + " --frames 1 2> " + file("said")), 5);
-  const std::string said = read(file("said"));
+  const std::string said = test::read_bytes(file("said"));
   EXPECT_NE(said.find("refused.json: asset 1: no shader of instances walks its BVH; bake it with --base"),
             std::string::npos)
       << said;
@@ -273,16 +262,18 @@ TEST_F(View, SaysWhatCannotBeShown) {
 // So is the bounce: its random numbers are the same, too, where nothing shines. Camera, sky and sun go with
 // the axis that is up.
 TEST_F(View, BounceIsThatOfLspRender) {
-  ASSERT_EQ(run("lsp-bake " + file("corner.obj") + " -o " + file("corner.lsp") +
-                " --quiet --base bvh --resolution 4"),
+  ASSERT_EQ(test::shell("lsp-bake " + file("corner.obj") + " -o " + file("corner.lsp") +
+                        " --quiet --base bvh --resolution 4"),
             0);
   std::vector<Shot> seen;
   for (const std::string up : {"--up y", "--up z"}) {
     const std::string options = " --quiet --effect diffuse --exposure 0 --size 160x90 " + up;
-    ASSERT_EQ(run("lsp-view " + file("corner.lsp") + options + " --frames 4 --split 1 --screenshot " +
-                  file("v.png")),
+    ASSERT_EQ(test::shell("lsp-view " + file("corner.lsp") + options + " --frames 4 --split 1 --screenshot " +
+                          file("v.png")),
               0);
-    ASSERT_EQ(run("lsp-render " + file("corner.lsp") + " -o " + file("r.png") + options + " --samples 4"), 0);
+    ASSERT_EQ(
+        test::shell("lsp-render " + file("corner.lsp") + " -o " + file("r.png") + options + " --samples 4"),
+        0);
     seen.push_back(read_png(file("v.png")));
     EXPECT_GT(mean(seen.back()), 4.0) << "it is black";
     EXPECT_LT(difference(seen.back(), read_png(file("r.png")), 0, kWidth).mean, 0.5) << up;
@@ -293,19 +284,20 @@ TEST_F(View, BounceIsThatOfLspRender) {
 // Every instance is lit with its own asset's materials, where its transform has put them.
 TEST_F(View, BounceOfInstancesIsThatOfLspRender) {
   std::ofstream(file("red.mtl")) << "newmtl white\nKd 0.9 0.9 0.9\nnewmtl red\nKd 0.9 0.1 0.1\n";
-  std::ofstream(file("red.obj")) << "mtllib red.mtl\nusemtl red\n" << read(file("corner.obj"));
+  std::ofstream(file("red.obj")) << "mtllib red.mtl\nusemtl red\n" << test::read_bytes(file("corner.obj"));
   for (const std::string name : {"corner", "red"})
-    ASSERT_EQ(
-        run("lsp-bake " + file(name + ".obj") + " -o " + file(name + "_wide.lsp") + " --quiet --base wide"),
-        0);
+    ASSERT_EQ(test::shell("lsp-bake " + file(name + ".obj") + " -o " + file(name + "_wide.lsp") +
+                          " --quiet --base wide"),
+              0);
   std::ofstream(file("two.json")) << R"({"lsp_scene": 1, "assets": ["corner_wide.lsp", "red_wide.lsp"],
       "instances": [{"asset": 1, "transform": [0,0,-1.5,5, 0,1,0,0, -0.7,0,0,5]},
                     {"asset": 0, "transform": [1,0,0,0, 0,1,0,0, 0,0,1,0]},
                     {"asset": 1, "transform": [1,0,0,-5, 0,2,0,0, 0,0,1,0]}]})";
   const std::string options =
       " --quiet --effect diffuse --exposure 0 --size 160x90 --camera 9,9,14:1,1,2:50 ";
-  ASSERT_EQ(run("lsp-view " + file("two.json") + options + "--frames 4 --screenshot " + file("v.png")), 0);
-  ASSERT_EQ(run("lsp-render " + file("two.json") + options + "--samples 4 -o " + file("r.png")), 0);
+  ASSERT_EQ(
+      test::shell("lsp-view " + file("two.json") + options + "--frames 4 --screenshot " + file("v.png")), 0);
+  ASSERT_EQ(test::shell("lsp-render " + file("two.json") + options + "--samples 4 -o " + file("r.png")), 0);
   const Shot seen = read_png(file("v.png"));
   EXPECT_LT(difference(seen, read_png(file("r.png")), 0, kWidth).mean, 0.05);
   size_t red = 0, grey = 0;
@@ -422,32 +414,33 @@ TEST_F(View, MeshesAreBakedFirst) {
 TEST_F(View, ValidationHasNothingToSay) {
   for (const std::string scene : {"cells.lsp", "placed.json"}) {
     const int exit = view(file(scene) + " --quiet --frames 2 --split 0.5 --validation 2> " + file("said"));
-    if (exit == 5 && read(file("said")).find("not installed") != std::string::npos)
-      GTEST_SKIP() << read(file("said"));
-    EXPECT_EQ(exit, 0) << read(file("said"));
+    if (exit == 5 && test::read_bytes(file("said")).find("not installed") != std::string::npos)
+      GTEST_SKIP() << test::read_bytes(file("said"));
+    EXPECT_EQ(exit, 0) << test::read_bytes(file("said"));
   }
 }
 
 TEST_F(View, ExitCodes) {
   const std::string scene = file("cells.lsp"), none = " >/dev/null 2>&1";
-  EXPECT_EQ(run("lsp-view --help" + none), 0);
-  EXPECT_EQ(run("lsp-view --version" + none), 0);
-  EXPECT_EQ(run("lsp-view" + none), 1);
+  EXPECT_EQ(test::shell("lsp-view --help" + none), 0);
+  EXPECT_EQ(test::shell("lsp-view --version" + none), 0);
+  EXPECT_EQ(test::shell("lsp-view" + none), 1);
   for (const std::string bad :
        {"--split 2", "--effect gloss", "--frames 0", "--size 0x7", "--camera 1,2", "--up x", "--max-loss -1",
         "--radius 0", "--exposure 99", "--frames 1 --screenshot x.jpg", "--screenshot x.png"}) {
-    EXPECT_EQ(run("lsp-view " + scene + " " + bad + none), 1) << bad;
+    EXPECT_EQ(test::shell("lsp-view " + scene + " " + bad + none), 1) << bad;
   }
-  EXPECT_EQ(run("lsp-view " + file("missing.lsp") + " --frames 1" + none), 2);
-  EXPECT_EQ(run("lsp-view " + file("missing.obj") + " --frames 1" + none), 2);
-  EXPECT_EQ(run("lsp-view " + scene + " --size 8x8 --frames 1 --screenshot /nonexistent/x.png" + none), 2);
+  EXPECT_EQ(test::shell("lsp-view " + file("missing.lsp") + " --frames 1" + none), 2);
+  EXPECT_EQ(test::shell("lsp-view " + file("missing.obj") + " --frames 1" + none), 2);
+  EXPECT_EQ(
+      test::shell("lsp-view " + scene + " --size 8x8 --frames 1 --screenshot /nonexistent/x.png" + none), 2);
   std::ofstream(file("text.lsp")) << "no scene";
-  EXPECT_EQ(run("lsp-view " + file("text.lsp") + " --frames 1" + none), 3);
+  EXPECT_EQ(test::shell("lsp-view " + file("text.lsp") + " --frames 1" + none), 3);
   std::ofstream(file("scene.json")) << "{}";
-  EXPECT_EQ(run("lsp-view " + file("scene.json") + " --frames 1" + none), 3);
+  EXPECT_EQ(test::shell("lsp-view " + file("scene.json") + " --frames 1" + none), 3);
   const std::string display = getenv("DISPLAY");
   setenv("DISPLAY", ":no", 1);
-  EXPECT_EQ(run("lsp-view " + scene + " --frames 1" + none), 5) << "there is no display";
+  EXPECT_EQ(test::shell("lsp-view " + scene + " --frames 1" + none), 5) << "there is no display";
   setenv("DISPLAY", display.c_str(), 1);
 }
 

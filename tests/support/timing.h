@@ -32,13 +32,6 @@ struct Contender {
 // second turn goes backwards, so that none is always first after another.
 std::vector<Timing> race(const std::vector<Contender>& contenders, int warm_up, int repeats);
 
-// Threads that run at once on this machine, at least 1.
-unsigned machine_threads();
-
 double seconds_since_start();  // wall clock, since the first call
-
-// Runs work(first, count) over [0, total) in chunks taken by `threads` threads as they come free; returns the
-// wall-clock seconds from the moment all of them stand ready. With one thread it runs here.
-double run_in_chunks(size_t total, unsigned threads, const std::function<void(size_t, size_t)>& work);
 
 }  // namespace lsp::bench

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "lsp/failures.hpp"
-#include "timing.h"
+#include "lsp/in_chunks.hpp"
 
 namespace lsp::bench {
 namespace {

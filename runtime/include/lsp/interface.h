@@ -63,6 +63,9 @@ LSP_END(LspHit)
 /* Any hit, and no more is asked than whether there is one: hit.t is finite then, the rest of the hit says nothing (it
  * may be filled or not). Saves a look-up of triangle and normals. */
 #define LSP_TRACE_OCCLUSION 0x20u
+/* `flags` and what they imply, for those who look at a flag alone. */
+#define LSP_TRACE_IMPLIED(flags) \
+  (((flags) & LSP_TRACE_OCCLUSION) != 0u ? (flags) | LSP_TRACE_ANY_HIT : (flags))
 
 /* ---- the trace shader ---------------------------------------------------------------------------------- */
 

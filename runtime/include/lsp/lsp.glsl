@@ -7,7 +7,7 @@
  *   #define LSP_NTREE                // the scene's base structure is an NTree, not a BVH
  *   #define LSP_CELLS                // or it has cells, and the rays are approximate
  *   #define LSP_WIDE                 // or exact, and the scene has wide nodes (LSP_FEATURE_WIDE)
- *   #define LSP_ADDRESSES            // sections are read through addresses, see lsp_addresses.glsl
+ *   #define LSP_ADDRESSES            // sections are read through addresses, see lsp_sections.glsl
  *   #define LSP_INSTANCES            // a scene of instances of many files, see lsp_instances.glsl
  *   #include "lsp/lsp.glsl"
  *
@@ -109,12 +109,7 @@ LspFilledCell lsp_cell_origins_of(uvec4 w) { return LspFilledCell(w.x, w.y, w.z,
 LspFilledCell lsp_cell_answers_of(uvec4 w) { return LspFilledCell(0u, 0u, 0u, 0u, w.x, w.y, w.z, w.w, 0u, 0u, 0u, 0u); }
 LspFilledCell lsp_cell_tree_of(uvec4 w) { return LspFilledCell(0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, w.x, w.y, w.z, w.w); }
 
-#ifdef LSP_ADDRESSES
-#include "lsp/lsp_addresses.glsl"
-#else
-#include "lsp/lsp_descriptors.glsl"
-#define LSP_HEADER(scene) lsp_header
-#endif
+#include "lsp/lsp_sections.glsl"
 
 /* What lsp/traverse.h asks for besides. */
 LspHeader lsp_load_header(LspScene scene) { return LSP_HEADER(scene); }

@@ -135,7 +135,7 @@ LspTraced lsp_trace_ray_instances(uint count, LspRay ray, uint mask, uint flags)
   traced.valid = lsp_is_valid(ray);
   if (!traced.valid || count == 0u) return traced;
   LspInstances instances = LspInstances(count);
-  bool any_hit = (flags & (LSP_TRACE_ANY_HIT | LSP_TRACE_OCCLUSION)) != 0u;
+  bool any_hit = (LSP_TRACE_IMPLIED(flags) & LSP_TRACE_ANY_HIT) != 0u;
   LspInstanceRay r = lsp_begin_instances(instances, ray);
   LspHit hit = traced.hit;
   LspCounts counts = traced.counts;

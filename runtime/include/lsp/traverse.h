@@ -433,7 +433,7 @@ LSP_FN LspTraced lsp_invalid_ray() {
 
 LSP_FN LspQuery lsp_query(uint flags, float lod, uint dial) {
   LspQuery q;
-  q.flags = (flags & LSP_TRACE_OCCLUSION) != 0u ? flags | LSP_TRACE_ANY_HIT : flags;
+  q.flags = LSP_TRACE_IMPLIED(flags);
   q.lod = lod;
   q.dial = dial;
   q.far = false;
