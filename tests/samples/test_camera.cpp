@@ -318,8 +318,8 @@ TEST_F(DefaultView, TheAxisIsThatOfTheSource) {
   bake(cube, "mesh.stl");
   EXPECT_EQ(render().at("up"), "z");
   EXPECT_NE(errors().find("comes from .stl: z is taken to be up"), std::string::npos) << errors();
-  ASSERT_EQ(run("lsp-render " + file("mesh.lsp") + " -o " + file("x.png") + " --size 8x8 --samples 1 > " +
-                file("out") + " 2>/dev/null"),
+  ASSERT_EQ(test::shell("lsp-render " + file("mesh.lsp") + " -o " + file("x.png") +
+                        " --size 8x8 --samples 1 > " + file("out") + " 2>/dev/null"),
             0);
   std::ifstream out(folder_ / "out");
   const std::string said{std::istreambuf_iterator<char>(out), {}};

@@ -97,11 +97,12 @@ TEST_F(Programs, ARoughMetalIsSeenAsDiffuse) {
     scene.materials[0].roughness = 1.0f;
     scene.materials[0].metallic = std::stof(metal);
     std::ofstream(file("metal" + metal + ".glb"), std::ios::binary) << to_glb(scene);
-    ASSERT_EQ(run("lsp-bake " + file("metal" + metal) + ".glb -o " + file("metal" + metal) + ".lsp --quiet"),
+    ASSERT_EQ(test::shell("lsp-bake " + file("metal" + metal) + ".glb -o " + file("metal" + metal) +
+                          ".lsp --quiet"),
               0);
     render("metal" + metal, "metal" + metal, "");
   }
-  EXPECT_EQ(read(file("metal0.pfm")), read(file("metal1.pfm")));
+  EXPECT_EQ(test::read_bytes(file("metal0.pfm")), test::read_bytes(file("metal1.pfm")));
 }
 
 TEST_F(Programs, ApproximateIsCloseAndPrimaryRaysAreExact) {

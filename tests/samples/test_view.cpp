@@ -394,12 +394,12 @@ TEST_F(View, MeshesAreBakedFirst) {
   ASSERT_EQ(view(file("corner.obj") + " --quiet --frames 1 --screenshot " + file("m.png")), 0);
   EXPECT_GT(mean(read_png(file("m.png"))), 4.0);
   // What the mesh lacks is said here as by lsp-bake.
-  std::ofstream(file("plain.obj")) << "mtllib none.mtl\nusemtl red\n" << read(file("corner.obj"));
+  std::ofstream(file("plain.obj")) << "mtllib none.mtl\nusemtl red\n" << test::read_bytes(file("corner.obj"));
   ASSERT_EQ(view(file("plain.obj") + " --frames 1 2> " + file("said")), 0);
-  EXPECT_NE(
-      read(file("said")).find("note: " + file("plain.obj") + ": the material library none.mtl is not there"),
-      std::string::npos)
-      << read(file("said"));
+  EXPECT_NE(test::read_bytes(file("said"))
+                .find("note: " + file("plain.obj") + ": the material library none.mtl is not there"),
+            std::string::npos)
+      << test::read_bytes(file("said"));
   std::filesystem::path left;
   {
     const BakedFile baked(file("corner.obj"), true);
