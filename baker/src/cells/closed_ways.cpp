@@ -13,10 +13,12 @@
 namespace lsp {
 namespace {
 
-constexpr uint32_t kEyes = 1u << 17;  // rays from eyes
-constexpr uint32_t kPerPoint = 4;     // rays from what each sees
-constexpr size_t kPart = 1024;        // traced at once
-constexpr float kOffset = 1e-4f;      // of the diagonal, of a ray's beginning from the surface
+constexpr uint32_t kPerWay = 16;      // rays of each way that are asked for, on average
+constexpr uint32_t kEyes = 1u << 14;  // that look at once
+constexpr uint32_t kMostEyes = 1u << 22;
+constexpr uint32_t kPerPoint = 4;  // rays from what each sees
+constexpr size_t kPart = 1024;     // traced at once
+constexpr float kOffset = 1e-4f;   // of the diagonal, of a ray's beginning from the surface
 constexpr uint64_t kSeed = uint64_t{1} << 42;
 
 // A way by which less than one ray in so many leaves the scene is closed.
@@ -35,9 +37,11 @@ class Ways {
         offset_(kOffset * glm::length(vec(header_.bounds_max) - vec(header_.bounds_min))),
         ways_(baked.cell_tables.cells.size()) {}
 
-  void look(uint32_t first, uint32_t count) {
+  // Counts the rays from what `count` eyes from number `first` on see, and returns their number.
+  uint64_t look(uint32_t first, uint32_t count) {
     trace(first, count);
     for (size_t i = 0; i < rays_.size(); ++i) add(rays_[i], !(hits_[i].t < INFINITY));
+    return rays_.size();
   }
 
   uint32_t closed(size_t cell) const {
@@ -140,8 +144,10 @@ class Ways {
 void find_closed_ways(Baked& baked) {
   if (baked.cell_tables.references.empty()) return;
   Ways ways(baked);
-  constexpr uint32_t kAtOnce = 1u << 14;
-  for (uint32_t first = 0; first < kEyes; first += kAtOnce) ways.look(first, kAtOnce);
+  const uint64_t wanted = uint64_t{kPerWay} * LSP_WAYS * baked.cell_tables.cells.size();
+  uint64_t rays = 0;
+  for (uint32_t first = 0; first < kMostEyes && rays < wanted; first += kEyes)
+    rays += ways.look(first, kEyes);
   for (size_t i = 0; i < baked.cell_tables.cells.size(); ++i)
     baked.cell_tables.cells[i].closed = ways.closed(i);
 }
