@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
 #include <span>
 
 #include "../surface_rays.h"
@@ -147,9 +146,9 @@ class Dial {
     return out;
   }
 
-  // The cheapest dial that keeps within errors, or the finest, of those that heed no more of either table
-  // than `most`. The more of the origin tables is heeded, the less of the far tables can be: a walk along the
-  // border of what is within.
+  // The dial that is cheapest over all rays of those that keep within errors, or the finest, and that heed no
+  // more of either table than `most`. The more of the origin tables is heeded, the less of the far tables can
+  // be: a walk along the border of what is within.
   uint32_t cheapest(double wrong, uint32_t most) {
     // What nobody knows is never heeded: rays of other places than these may come there.
     constexpr uint32_t kClasses[] = {0, 1, 2, 3, 4, 5, 6, LSP_LOSS_UNKNOWN};
@@ -163,7 +162,7 @@ class Dial {
       bool kept = true;
       for (const Rays& set : sets_) {
         const DialError error = measure(set, LSP_QUALITY_BALANCED);
-        cost = std::max(cost, kVulkan.cells(error.counts));
+        cost += kVulkan.cells(error.counts);
         kept = kept && within(error, wrong);
         if (!kept) break;
       }
@@ -212,14 +211,11 @@ class Dial {
     return sum / kPerPoint;
   }
 
-  // The error of all views but the two worst of twelve: they may look where tables know nothing, and nobody
-  // else should pay for it.
-  static constexpr size_t kSpared = 2;
+  // The error of the view that errs most.
   double worst_picture(const Rays& set, const std::vector<LspHit>& hits, double radius) const {
-    std::vector<double> errors;
-    for (const View& view : set.views) errors.push_back(picture(set, hits, view, radius));
-    std::sort(errors.begin(), errors.end(), std::greater<>());
-    return errors.empty() ? 0 : errors[errors.size() == kViews ? kSpared : 0];
+    double worst = 0;
+    for (const View& view : set.views) worst = std::max(worst, picture(set, hits, view, radius));
+    return worst;
   }
 
   // The error of a picture of ambient occlusion; where nothing is seen it is white.
