@@ -69,8 +69,9 @@ struct Tracer {
   Lanes<uint32_t> index{}, entry{}, plane_first{}, plane_count{}, plane{};
   Lanes<float> t_out{}, place[5]{};
   // Rays that look into a filled cell, of which some do not know what they lose there; that are done; that
-  // are to be traced exactly; whose answer is a split; that have a plane to meet.
-  Bits filled = 0, unknown = 0, over = 0, exact = 0, split = 0, meets = 0;
+  // are to be traced exactly; whose answer is a split; that have a plane to meet; whose plane is there in
+  // part, so that they are to be traced exactly as well.
+  Bits filled = 0, unknown = 0, over = 0, exact = 0, split = 0, meets = 0, in_part = 0;
 
   uint32_t next = 0;
   Found found[kPool];
@@ -539,12 +540,8 @@ struct Tracer {
       add_found(ray_[k], plane);
       return;
     }
-    ExactTrace& trace = turns[0];
-    trace.begin(scene, rays[ray_[k]], static_cast<uint32_t>(k), index[k],
-                {cell_[0][k], cell_[1][k], cell_[2][k]}, t_[k], t_out[k]);
-    while (trace.descend(scene) && trace.test(scene, any_hit)) {
-    }
-    end_exactly(trace);
+    in_part |= Bits{1} << k;
+    fetch_tree(index[k]);
   }
 
   void end_exactly(const ExactTrace& trace) {
@@ -561,10 +558,10 @@ struct Tracer {
   }
 
   // The rays that are to be traced exactly, each in its cell, kTurns of them in turn.
-  void trace_exactly() {
+  HWY_NOINLINE void trace_exactly(Bits these) {
     uint32_t waiting[kPool];
     size_t left = 0;
-    LSP_FOR_BITS(k, exact) waiting[left++] = static_cast<uint32_t>(k);
+    LSP_FOR_BITS(k, these) waiting[left++] = static_cast<uint32_t>(k);
     ExactTrace* on[kTurns];
     size_t on_count = 0;
     const auto begin_one = [&](ExactTrace* trace) HWY_ATTR {
@@ -643,7 +640,7 @@ struct Tracer {
 
   void run() {
     for (;;) {
-      filled = unknown = over = exact = split = meets = 0;
+      filled = unknown = over = exact = split = meets = in_part = 0;
       const size_t old = n;
       for (size_t i = 0; i < old; i += kLanes) advance<false>(i, old);
       begin_rays();
@@ -654,9 +651,10 @@ struct Tracer {
       finish();
       for (size_t i = 0; i < n; i += kLanes)
         if (lanes_of(split, i) != 0) choose(i);
-      if (exact != 0) trace_exactly();
+      if (exact != 0) trace_exactly(exact);
       for (size_t i = 0; i < n; i += kLanes)
         if (lanes_of(meets, i) != 0) meet(i);
+      if (in_part != 0) trace_exactly(in_part);
       compact();
     }
   }
