@@ -52,7 +52,7 @@ struct BakeOptions {
 };
 
 // What a quality of cells errs and gains, as the bake measured it on rays of its own: the worst of rays from
-// the surfaces, of rays from what eyes in the scene see, and of ten of twelve small pictures (dial.h).
+// the surfaces, of rays from what eyes in the scene see, and of twelve small pictures (dial.h).
 struct QualityFigures {
   double wrong = 0;      // share of the rays that hit or miss wrongly
   double depth = 0;      // mean error of the distance where both hit, in diagonals
