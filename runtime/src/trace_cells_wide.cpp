@@ -5,8 +5,8 @@
 // the next one reads, for all rays of the pool, so that no ray waits for memory alone (as trace_group.h does
 // it for trees): to the next cell and its entry; what the entry says; the side of a split; the plane. Rays
 // that are done make room for new ones, whose first cells are looked at apart from the others': only there
-// origin tables are asked. Rays that are to be traced exactly in a cell are, several in turn
-// (wide_exact-inl.h), once what they read first was asked for.
+// origin tables are asked. Rays that are to be traced exactly in a cell leave the pool for lanes of their own
+// (wide_calls-inl.h), and come back if they hit nothing there.
 //
 // This is a second text of what lsp/cells.h says from lsp_begin to lsp_cell_meet, and of the half of
 // lsp_setup (lsp/traverse.h) that this needs, operation by operation: nothing is contracted, and comparisons
@@ -14,6 +14,7 @@
 // test_wide_cells.cpp compares the two.
 #include "trace_cells_wide.h"
 
+#include <algorithm>
 #include <limits>
 
 #include "simd_targets.h"
@@ -25,7 +26,8 @@
 
 // Without vectors there is the loop of trace_cells.cpp.
 #if HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_EMU128
-#include "wide_exact-inl.h"
+#include "wide_calls-inl.h"
+#include "wide_found-inl.h"
 #include "wide_lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -33,19 +35,13 @@ namespace lsp {
 namespace HWY_NAMESPACE {
 namespace {
 
-// Exact traces that take turns. With 16 it is the same, and asking for more of a tree before does not help.
-constexpr size_t kTurns = 8;
-
 // A ray's doubt_: a miss of it is a mistake, and it was one (LspWalk.closed, .again).
 constexpr uint32_t kClosed = 1, kAgain = 2;
 
-// A hit whose triangle was asked for.
-struct Found {
-  uint32_t ray;
-  Text::LspBest best;
-};
+// Exact traces that are kept under way when room is made for others.
+constexpr size_t kKept = 48;
 
-struct Tracer {
+struct Tracer : Rays<kPool> {
   const lsp_scene& scene;
   const LspCellGrid& grid;
   const LspRay* rays;
@@ -57,13 +53,10 @@ struct Tracer {
   const bool partial;  // some triangles are there in part
   Arrays arrays;
 
-  // A value a lane, of rays under way: the first `n`.
+  // A value a lane, of rays in a round.
   template <typename T>
   using Lanes = T[kPool + kLanes];
   size_t n = 0;
-  Lanes<uint32_t> ray_{}, step_{}, doubt_{};
-  Lanes<float> origin_[3]{}, direction_[3]{}, inverse_[3]{}, tmin_{}, tmax_{}, t_{}, t_last_{};
-  Lanes<int32_t> cell_[3]{}, axis_{};
   // Of a round: where a ray goes next, its entry and its place there, its plane.
   Lanes<int32_t> next_cell[3]{}, axis_out{};
   Lanes<uint32_t> index{}, entry{}, plane_first{}, plane_count{}, plane{};
@@ -74,9 +67,13 @@ struct Tracer {
   Bits filled = 0, unknown = 0, over = 0, exact = 0, split = 0, meets = 0, in_part = 0;
 
   uint32_t next = 0;
-  Found found[kPool];
-  size_t found_count = 0;
-  ExactTrace turns[kTurns];
+  Found<kPool + Calls::kMost> found;
+  // Rays that are to be traced exactly, and those that were and hit nothing. New ones begin only when none
+  // waits: no more than kPool + kMost are under way. Where `more` of them make room for themselves they are
+  // in the pool still, and of the others kKept or kMost - more are left: the rest waits at most.
+  Calls calls;
+  Rays<kPool + Calls::kMost - kKept> waiting;
+  size_t waiting_count = 0;
 
   Tracer(const lsp_scene& scene, uint32_t flags, uint32_t dial, const LspRay* rays, LspHit* hits,
          uint32_t count)
@@ -95,17 +92,19 @@ struct Tracer {
                set_u(scene.header->filled_cell_count),
                set_u(scene.header->plane_count),
                set_u(scene.header->split_count),
-               set_u(scene.header->entry_word_count)} {}
+               set_u(scene.header->entry_word_count)},
+        calls(scene, rays, any_hit) {}
 
-  static HWY_INLINE V3 load_3(const Lanes<float> (&from)[3], size_t i) {
+  template <size_t kMost>
+  static HWY_INLINE V3 load_3(const float (&from)[3][kMost], size_t i) {
     return {load(from[0] + i), load(from[1] + i), load(from[2] + i)};
   }
-  static HWY_INLINE void store_3(const V3& v, Lanes<float> (&to)[3], size_t i) {
+  template <size_t kMost>
+  static HWY_INLINE void store_3(const V3& v, float (&to)[3][kMost], size_t i) {
     store(v.x, to[0] + i);
     store(v.y, to[1] + i);
     store(v.z, to[2] + i);
   }
-  static HWY_INLINE Bits lanes_of(Bits bits, size_t i) { return bits >> i & ((Bits{1} << kLanes) - 1); }
 
   void end(uint32_t number, uint32_t flags) {
     hits[number] = Text::lsp_no_hit();
@@ -119,14 +118,6 @@ struct Tracer {
   static HWY_INLINE MF is_finite(const V3& v) {
     return hn::And(is_finite(v.x), hn::And(is_finite(v.y), is_finite(v.z)));
   }
-  static HWY_INLINE VF no_trifle(VF d) {
-    return hn::IfThenZeroElse(hn::Lt(hn::Abs(d), set(8.6736174e-19f)), d);
-  }
-  static HWY_INLINE VF reciprocal(VF d) {
-    const MF is_zero = hn::Eq(d, hn::Zero(df));
-    return select(is_zero, set(1.2089258e24f), hn::Div(set(1.0f), select(is_zero, set(1.0f), d)));
-  }
-
   // New rays into free lanes: what lsp_setup says of direction and interval, lsp_cell_ray. An invalid ray
   // ends before it begins.
   HWY_INLINE void set_up(size_t i) {
@@ -139,17 +130,13 @@ struct Tracer {
     for (size_t k = 0; k < 8; ++k) field[k] = hn::BitCast(df, record[k]);
     const V3 o{field[0], field[1], field[2]}, d{field[4], field[5], field[6]};
     const VF from = field[3], to = field[7];
-    const VF largest = max_of(max_of(hn::Abs(d.x), hn::Abs(d.y)), hn::Abs(d.z));
-    const VU stated = hn::ShiftRight<23>(hn::BitCast(du, largest));
-    const MU is_large = hn::Lt(set_u(253), stated);
-    const VU exponent = select(is_large, set_u(253), stated);
-    // A NaN of either end is not ordered.
+    const Scaled by = scale(d);
+    // A NaN of either end is not ordered; a direction without an exponent is none.
+    const VU exponent = hn::ShiftRight<23>(hn::BitCast(du, by.stretch));
     const MF valid = hn::And(hn::And(is_finite(o), is_finite(d)),
-                             hn::And(hn::Le(from, to), as_float(hn::Ne(stated, hn::Zero(du)))));
-    const VF shrink = hn::BitCast(df, hn::ShiftLeft<23>(hn::Sub(set_u(254), exponent)));
-    const VF to_scaled = hn::BitCast(df, hn::ShiftLeft<23>(exponent));
-    const V3 scaled = {no_trifle(hn::Mul(d.x, shrink)), no_trifle(hn::Mul(d.y, shrink)),
-                       no_trifle(hn::Mul(d.z, shrink))};
+                             hn::And(hn::Le(from, to), as_float(hn::Ne(exponent, hn::Zero(du)))));
+    const VF to_scaled = by.stretch;
+    const V3 scaled = by.direction;
     const VF a_step = hn::Mul(hn::BitCast(df, set_u(1)), to_scaled);
     const VF most = set(std::numeric_limits<float>::max());
     const VF first = hn::Add(hn::Mul(from, to_scaled), a_step);
@@ -434,7 +421,6 @@ struct Tracer {
     over |= sky << i;
     const Bits exact_bits = bits_of(exactly);
     exact |= exact_bits << i;
-    LSP_FOR_BITS(k, exact_bits) fetch_tree(index[i + k]);
     const Bits answer_bits = bits_of(answers);
     if (answer_bits == 0) return;
 
@@ -455,12 +441,6 @@ struct Tracer {
   HWY_INLINE void fetch_plane(uint32_t number) {
     fetch(scene.planes, number);
     fetch(scene.plane_records, number);
-  }
-  HWY_INLINE void fetch_tree(uint32_t cell) {
-    const LspFilledCell& tree = lsp_load_cell_tree(scene, cell);
-    fetch(scene.cell_nodes, tree.node_first);
-    fetch(scene.cell_nodes, tree.node_first + 4);
-    fetch(scene.cell_references, tree.reference_first);
   }
 
   // lsp_split_weight, of the six bits below `shift` bits from the top.
@@ -541,120 +521,75 @@ struct Tracer {
       return;
     }
     in_part |= Bits{1} << k;
-    fetch_tree(index[k]);
-  }
-
-  void end_exactly(const ExactTrace& trace) {
-    if (trace.best().triangle == LSP_NONE) return;
-    over |= Bits{1} << trace.lane();
-    add_found(ray_[trace.lane()], trace.best());
   }
 
   HWY_INLINE void add_found(uint32_t number, const Text::LspBest& best) {
-    fetch(scene.triangles, best.triangle);
-    if (scene.normals != nullptr) fetch(scene.normals, best.triangle);
-    found[found_count] = {number, best};
-    found[found_count++].best.complete = true;
+    found.add(scene, number, best.triangle, best.t, best.u, best.v, best.flags);
   }
 
-  // The rays that are to be traced exactly, each in its cell, kTurns of them in turn.
-  HWY_NOINLINE void trace_exactly(Bits these) {
-    uint32_t waiting[kPool];
-    size_t left = 0;
-    LSP_FOR_BITS(k, these) waiting[left++] = static_cast<uint32_t>(k);
-    ExactTrace* on[kTurns];
-    size_t on_count = 0;
-    const auto begin_one = [&](ExactTrace* trace) HWY_ATTR {
-      while (left != 0) {
-        const uint32_t k = waiting[--left];
-        trace->begin(scene, rays[ray_[k]], k, index[k], {cell_[0][k], cell_[1][k], cell_[2][k]}, t_[k],
-                     t_out[k]);
-        if (trace->descend(scene)) return true;
-      }
-      return false;
-    };
-    for (size_t k = 0; k < kTurns && begin_one(&turns[k]); ++k) on[on_count++] = &turns[k];
-    while (on_count != 0) {
-      size_t kept = 0;
-      for (size_t k = 0; k < on_count; ++k) {
-        ExactTrace* trace = on[k];
-        bool goes_on = trace->test(scene, any_hit) && trace->descend(scene);
-        if (!goes_on) {
-          end_exactly(*trace);
-          goes_on = begin_one(trace);
-        }
-        if (goes_on) on[kept++] = trace;
-      }
-      on_count = kept;
+  // Goes on with the exact traces until no more than `most` are under way.
+  HWY_NOINLINE void trace_calls(size_t most) {
+    calls.trace(
+        most, [&](uint32_t ray, const Text::LspBest& best) { add_found(ray, best); },
+        [&](const Rays<Calls::kMost>& from, size_t i, Bits lanes) HWY_ATTR {
+          waiting.take(from, i, lanes, waiting_count);
+          waiting_count += static_cast<size_t>(std::popcount(lanes));
+        });
+  }
+
+  // Those that hit nothing there come back.
+  void join() {
+    while (waiting_count != 0 && n < kPool) {
+      const size_t room = kPool - n < kLanes ? kPool - n : kLanes;
+      const size_t more = waiting_count < room ? waiting_count : room;
+      waiting_count -= more;
+      this->take(waiting, waiting_count, (Bits{1} << more) - 1, n);
+      n += more;
     }
   }
 
-  // The answers of the rays that hit something in the round before.
-  void finish() {
-    for (size_t k = 0; k < found_count; ++k) {
-      const LspRay& of = rays[found[k].ray];
-      hits[found[k].ray] = Text::lsp_finish(scene, Text::lsp_setup(scene, of), of, found[k].best, flags);
-    }
-    found_count = 0;
-  }
-
-  template <typename T, class Indices>
-  static HWY_INLINE void move(const T* from, T* to, size_t i, size_t at, Indices indices) {
-    store(hn::TableLookupLanes(load(from + i), indices), to + at);
-  }
-
-  // Lanes that are set, one after the other.
-  static HWY_INLINE VI lane_order(Bits bits) {
-    if constexpr (kLanes > 8) return hn::Compress(hn::Iota(di, 0), as_int(mask_of(bits)));
-    const hn::Rebind<uint8_t, DI> bytes;
-    return hn::PromoteTo(di, hn::LoadU(bytes, reinterpret_cast<const uint8_t*>(&kLaneOrders.of[bits & 255])));
-  }
-
-  // The rays that go on, to the cells they go to, in the first lanes.
+  // The rays of this round to the cells they go to, those that are to be traced exactly to the calls, and the
+  // others that go on into the first lanes.
   void compact() {
+    const Bits called = exact | in_part;
+    if (const auto more = static_cast<size_t>(std::popcount(called)); calls.size() + more > Calls::kMost)
+      trace_calls(std::min(Calls::kMost - more, kKept));
     size_t at = 0;
     for (size_t i = 0; i < n; i += kLanes) {
-      const Bits on = lanes_of(~over, i) & ((n - i < kLanes ? Bits{1} << (n - i) : Bits{1} << kLanes) - 1);
-      const VI order = lane_order(on);
-      const auto of_f = hn::IndicesFromVec(df, order);
-      const auto of_i = hn::IndicesFromVec(di, order);
-      const auto of_u = hn::IndicesFromVec(du, order);
-      for (size_t k = 0; k < 3; ++k) {
-        move(origin_[k], origin_[k], i, at, of_f);
-        move(direction_[k], direction_[k], i, at, of_f);
-        move(inverse_[k], inverse_[k], i, at, of_f);
-        move(next_cell[k], cell_[k], i, at, of_i);
-      }
-      move(tmin_, tmin_, i, at, of_f);
-      move(tmax_, tmax_, i, at, of_f);
-      move(t_last_, t_last_, i, at, of_f);
-      move(t_out, t_, i, at, of_f);
-      move(axis_out, axis_, i, at, of_i);
-      move(ray_, ray_, i, at, of_u);
-      move(doubt_, doubt_, i, at, of_u);
-      store(hn::Add(hn::TableLookupLanes(load(step_ + i), of_u), set_u(1)), step_ + at);
+      const Bits calling = lanes_of(called, i);
+      const V3 corner = corner_of(load(cell_[0] + i), load(cell_[1] + i), load(cell_[2] + i));
+      const VF t_in = load(t_ + i);
+      for (size_t k = 0; k < 3; ++k) store(load(next_cell[k] + i), cell_[k] + i);
+      store(load(t_out + i), t_ + i);
+      store(load(axis_out + i), axis_ + i);
+      store(hn::Add(load(step_ + i), set_u(1)), step_ + i);
+      if (calling != 0) calls.add(*this, i, calling, load(index + i), corner, t_in);
+      const Bits on = lanes_of(~(over | called), i, n);
+      this->take(*this, i, on, at);
       at += static_cast<size_t>(std::popcount(on));
     }
+    calls.begin(count);
     n = at;
   }
 
   void run() {
     for (;;) {
       filled = unknown = over = exact = split = meets = in_part = 0;
+      if (n == 0 && next == count && waiting_count == 0) trace_calls(0);
+      join();
       const size_t old = n;
       for (size_t i = 0; i < old; i += kLanes) advance<false>(i, old);
       begin_rays();
       for (size_t i = old; i < n; i += kLanes) advance<true>(i, n);
-      if (n == 0 && found_count == 0) return;
+      if (n == 0 && found.size() == 0) return;
       for (size_t i = 0; i < n; i += kLanes)
         if (lanes_of(filled, i) != 0) classify(i);
-      finish();
+      // Of the round before.
+      found.answer({scene, rays, hits, count, (flags & LSP_TRACE_OCCLUSION) != 0, true});
       for (size_t i = 0; i < n; i += kLanes)
         if (lanes_of(split, i) != 0) choose(i);
-      if (exact != 0) trace_exactly(exact);
       for (size_t i = 0; i < n; i += kLanes)
         if (lanes_of(meets, i) != 0) meet(i);
-      if (in_part != 0) trace_exactly(in_part);
       compact();
     }
   }
@@ -667,7 +602,7 @@ void trace(const lsp_scene& scene, uint32_t flags, uint32_t dial, const LspRay* 
     const uint64_t rest = count - first;
     Tracer tracer(scene, flags, dial, rays + first, hits + first,
                   static_cast<uint32_t>(rest < kAtOnce ? rest : kAtOnce));
-    static_assert(sizeof tracer <= 20 * 1024);  // of the stack, as lsp/lsp.h says
+    static_assert(sizeof tracer <= 50 * 1024);  // of the stack, as lsp/lsp.h says
     tracer.run();
   }
 }

@@ -13,6 +13,8 @@
 // beyond 2^40, rays are traced by the text of single ones.
 #include "trace_wide_lanes.h"
 
+#include <algorithm>
+
 #include "simd_targets.h"
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "trace_wide_lanes.cpp"
@@ -25,7 +27,7 @@
 #include "trace_loops.h"
 #include "trace_subset.h"
 #include "trace_variant.h"
-#include "wide_triangles-inl.h"
+#include "wide_found-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace lsp {
@@ -46,8 +48,8 @@ constexpr size_t kChildren = LSP_WIDE_CHILDREN;
 using D8 = hn::CappedTag<float, kChildren>;
 using V8 = hn::Vec<D8>;
 constexpr D8 d8;
-constexpr size_t kLanes = hn::MaxLanes(D8());  // 8, or 4 twice
-constexpr size_t kParts = kChildren / kLanes;
+constexpr size_t kBoxes = hn::MaxLanes(D8());  // 8, or 4 twice; rays are made ready as many at a time
+constexpr size_t kParts = kChildren / kBoxes;
 
 // All children but one of every node on a path wait, and a mark below them.
 constexpr uint32_t kStack = LSP_MAX_STACK * (kChildren - 1) + 1;
@@ -78,15 +80,15 @@ constexpr uint8_t kPlanes[8][3] = {{24, 32, 40}, {0, 32, 40}, {24, 8, 40}, {0, 8
 // Rays made ready, a lane each, of which every ray then has its rows: what boxes and triangles take of
 // lsp_setup, operation by operation.
 struct Batch {
-  using Rows = float[kLanes][4];  // x, y, z, and zero
-  using Values = float[kLanes];
+  using Rows = float[kBoxes][4];  // x, y, z, and zero
+  using Values = float[kBoxes];
   // For boxes: where a plane is met is plane * inverse + base, of those met first and of those met last.
   HWY_ALIGN Rows inverse, first_base, last_base;
   // For triangles, the ray's axis last.
   HWY_ALIGN Rows origin, shear, direction;
-  HWY_ALIGN Values tmin, tmax, to_given;
-  HWY_ALIGN uint32_t axis[kLanes];
-  HWY_ALIGN uint32_t forward[kLanes];  // axes along which the ray goes up, a bit each
+  HWY_ALIGN Values tmin, tmax;
+  HWY_ALIGN uint32_t axis[kBoxes];
+  HWY_ALIGN uint32_t forward[kBoxes];  // axes along which the ray goes up, a bit each
   uint32_t ready;                      // of the others nothing else is set: they are invalid, or not tame
 };
 
@@ -94,7 +96,7 @@ struct Batch {
 struct Ready {
   V8 inverse, first_base, last_base;  // in every block of four lanes
   const uint8_t *first, *last;  // by axis the planes that are met first and last: byte of LspWideNode.planes
-  float tmin, tmax, to_given;
+  float tmin, tmax;
   const float *origin, *shear, *direction;
   size_t axis;
   Bytes rotation;
@@ -108,19 +110,12 @@ struct Ready {
         last(kPlanes[7 - b.forward[i]]),
         tmin(b.tmin[i]),
         tmax(b.tmax[i]),
-        to_given(b.to_given[i]),
         origin(b.origin[i]),
         shear(b.shear[i]),
         direction(b.direction[i]),
         axis(b.axis[i]),
         rotation(hn::Load(hn::Repartition<uint8_t, D4>(), kRotations[axis])),
         given(&ray) {}
-
-  // As given, scaled.
-  HWY_INLINE vec3 unrotated() const {
-    const float* d = direction;
-    return axis == 2 ? vec3(d[0], d[1], d[2]) : axis == 0 ? vec3(d[2], d[0], d[1]) : vec3(d[1], d[2], d[0]);
-  }
 };
 
 // What is waiting, of closest rays a child of a node: where it is entered, and 8 * node + child. Of any-hit
@@ -150,27 +145,41 @@ class Tracer {
 
   template <bool kAny>
   HWY_INLINE void trace(const LspRay* rays, LspHit* hits, uint64_t count, uint32_t flags) {
-    for (uint64_t first = 0; first < count; first += kLanes) {
+    for (uint64_t first = 0; first < count; first += kBoxes) {
       const uint64_t left = count - first;
-      const size_t here = left < kLanes ? static_cast<size_t>(left) : kLanes;
+      const size_t here = left < kBoxes ? static_cast<size_t>(left) : kBoxes;
       make_ready(rays + first, here);
-      for (size_t i = 0; i < here; ++i)
-        hits[first + i] = (batch_.ready >> i & 1u) != 0
-                              ? trace_one<kAny>(rays[first + i], Ready(batch_, i, rays[first + i]), flags)
-                              : trace_singly(rays[first + i], flags);
+      for (size_t i = 0; i < here; ++i) {
+        const uint64_t k = first + i;
+        if ((batch_.ready >> i & 1u) != 0)
+          trace_one<kAny>(Ready(batch_, i, rays[k]), static_cast<uint32_t>(k), hits[k]);
+        else
+          hits[k] = trace_singly(rays[k], flags);
+      }
+      if (found_.size() >= kLanes) finish(rays, hits, count, flags);
     }
+    finish(rays, hits, count, flags);
   }
 
  private:
+  HWY_INLINE void finish(const LspRay* rays, LspHit* hits, uint64_t count, uint32_t flags) {
+    found_.answer(
+        {scene_, rays, hits, static_cast<uint32_t>(count), (flags & LSP_TRACE_OCCLUSION) != 0, false});
+  }
+
   template <bool kAny>
-  HWY_INLINE LspHit trace_one(const LspRay& ray, const Ready& r, uint32_t flags) {
-    Text::LspSetup s;  // what lsp_finish asks for of a hit
-    s.to_given = r.to_given;
-    s.direction = r.unrotated();
-    s.tmax = r.tmax;
-    Text::LspBest best = Text::lsp_no_best(s);
-    best.complete = node_count_ == 0 || walk<kAny>(r, best);
-    return Text::lsp_finish(scene_, s, ray, best, flags);
+  HWY_INLINE void trace_one(const Ready& r, uint32_t number, LspHit& hit) {
+    Text::LspBest best{};
+    best.t = r.tmax;
+    best.triangle = LSP_NONE;
+    const bool complete = node_count_ == 0 || walk<kAny>(r, best);
+    const uint32_t flags = complete ? 0 : LSP_HIT_INCOMPLETE;
+    if (best.triangle != LSP_NONE) {
+      found_.add(scene_, number, best.triangle, best.t, best.u, best.v, flags);
+    } else {
+      hit = Text::lsp_no_hit();
+      hit.flags = flags;
+    }
   }
 
   static bool is_tame(const vec3& v) { return Text::lsp_largest(v) < kTame; }
@@ -192,15 +201,15 @@ class Tracer {
     V8 tmin, tmax;
   };
   static HWY_INLINE Rays load(const LspRay* rays, size_t count) {
-    LspRay padded[kLanes];
-    if (count < kLanes) {
-      for (size_t i = 0; i < kLanes; ++i) padded[i] = rays[i < count ? i : count - 1];
+    LspRay padded[kBoxes];
+    if (count < kBoxes) {
+      for (size_t i = 0; i < kBoxes; ++i) padded[i] = rays[i < count ? i : count - 1];
       rays = padded;
     }
     // Of half of them in turn: origin and tmin in even lanes, direction and tmax in odd ones.
     V8 low[4], high[4], even[4], odd[4];
     hn::LoadInterleaved4(d8, &rays[0].origin.x, low[0], low[1], low[2], low[3]);
-    hn::LoadInterleaved4(d8, &rays[kLanes / 2].origin.x, high[0], high[1], high[2], high[3]);
+    hn::LoadInterleaved4(d8, &rays[kBoxes / 2].origin.x, high[0], high[1], high[2], high[3]);
     for (size_t k = 0; k < 4; ++k) {
       even[k] = hn::ConcatEven(d8, high[k], low[k]);
       odd[k] = hn::ConcatOdd(d8, high[k], low[k]);
@@ -243,7 +252,6 @@ class Tracer {
     const V8 step = hn::Mul(hn::BitCast(d8, set_u(1)), to_scaled), most = hn::Set(d8, LSP_FLOAT_MAX);
     hn::Store(hn::Add(hn::Mul(rays.tmin, to_scaled), step), d8, batch_.tmin);
     hn::Store(hn::Min(hn::Sub(hn::Mul(hn::Min(rays.tmax, most), to_scaled), step), most), d8, batch_.tmax);
-    hn::Store(shrink, d8, batch_.to_given);
 
     const auto scaled = [&](V8 x) HWY_ATTR {
       const V8 s = hn::Mul(x, shrink);
@@ -318,7 +326,7 @@ class Tracer {
     const V8 near = hn::MulAdd(lo, r.inverse, r.first_base), far = hn::MulAdd(lo, r.inverse, r.last_base);
     const auto* bytes = reinterpret_cast<const uint8_t*>(node.planes);
     uint32_t hits = 0;
-    for (size_t part = 0; part < kParts; ++part, bytes += kLanes) {
+    for (size_t part = 0; part < kParts; ++part, bytes += kBoxes) {
       const V8 first_x =
           hn::MulAdd(planes_at(bytes + r.first[0]), hn::Broadcast<0>(unit), hn::Broadcast<0>(near));
       const V8 first_y =
@@ -333,8 +341,8 @@ class Tracer {
           hn::MulAdd(planes_at(bytes + r.last[2]), hn::Broadcast<2>(unit), hn::Broadcast<2>(far));
       const V8 first = larger(first_z, larger(first_y, larger(first_x, tmin)));
       const V8 last = smaller(last_z, smaller(last_y, smaller(last_x, tmax)));
-      hn::Store(first, d8, entries + part * kLanes);
-      hits |= mask_bits(d8, hn::Le(first, last)) << (part * kLanes);
+      hn::Store(first, d8, entries + part * kBoxes);
+      hits |= mask_bits(d8, hn::Le(first, last)) << (part * kBoxes);
     }
     return hits;
   }
@@ -497,16 +505,21 @@ class Tracer {
   const uint32_t node_count_, triangle_count_, most_;
   float most_largest_ = kTame;  // coordinate of an origin; none, where the scene's are not tame
   Batch batch_;
+  Found<kBoxes + kLanes> found_;
   Waiting stack_[kStack];
 };
 
 void trace(const lsp_scene& scene, uint32_t flags, const LspRay* rays, LspHit* hits, uint64_t count) {
   Tracer tracer(scene);
   static_assert(sizeof tracer <= 20 * 1024);  // of the stack, as lsp/lsp.h says
-  if ((flags & LSP_TRACE_ANY_HIT) != 0)
-    tracer.trace<true>(rays, hits, count, flags);
-  else
-    tracer.trace<false>(rays, hits, count, flags);
+  constexpr uint64_t kAtOnce = 1u << 30;      // numbers of rays have 32 bits
+  for (uint64_t first = 0; first < count; first += kAtOnce) {
+    const uint64_t here = std::min(count - first, kAtOnce);
+    if ((flags & LSP_TRACE_ANY_HIT) != 0)
+      tracer.trace<true>(rays + first, hits + first, here, flags);
+    else
+      tracer.trace<false>(rays + first, hits + first, here, flags);
+  }
 }
 
 }  // namespace

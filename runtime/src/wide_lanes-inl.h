@@ -1,5 +1,5 @@
-// Vectors of rays, for trace_cells_wide.cpp: what it calculates with, and how lanes read a scene's arrays.
-// Included once for every instruction set, as Highway has it.
+// Rays under way in lanes, for trace_cells_wide.cpp and wide_calls-inl.h: where they are kept, and what cells
+// calculate with.
 #if defined(LSP_WIDE_LANES_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef LSP_WIDE_LANES_INL_H
 #undef LSP_WIDE_LANES_INL_H
@@ -7,12 +7,7 @@
 #define LSP_WIDE_LANES_INL_H
 #endif
 
-#include <hwy/highway.h>
-#include <bit>
-
-#include "trace_subset.h"
-#include "trace_variant.h"
-#include "wide_triangles-inl.h"
+#include "wide_vectors-inl.h"
 
 // What does not depend on the instruction set.
 #ifndef LSP_LANE_ORDERS
@@ -41,9 +36,6 @@ namespace lsp {
 namespace HWY_NAMESPACE {
 namespace {
 
-namespace hn = hwy::HWY_NAMESPACE;
-using namespace subset;
-
 // The text of single rays.
 struct Text {
 #define LSP_CELLS
@@ -51,63 +43,45 @@ struct Text {
 #undef LSP_CELLS
 };
 
-using DF = hn::ScalableTag<float>;
-using DI = hn::RebindToSigned<DF>;
-using DU = hn::RebindToUnsigned<DF>;
-using VF = hn::Vec<DF>;
-using VI = hn::Vec<DI>;
-using VU = hn::Vec<DU>;
-using MF = hn::Mask<DF>;
-using MI = hn::Mask<DI>;
-using MU = hn::Mask<DU>;
-constexpr DF df;
-constexpr DI di;
-constexpr DU du;
-constexpr size_t kLanes = hn::MaxLanes(DF());
-
-// Rays under way, a bit of a word each.
+// Rays of a round, a bit of a word each.
 constexpr size_t kPool = 64;
-using Bits = uint64_t;
 
-struct V3 {
-  VF x, y, z;
+// Of the rays from i on, n in all, those whose bits are set.
+HWY_INLINE Bits lanes_of(Bits bits, size_t i, size_t n = kPool) {
+  return bits >> i & ((Bits{1} << (n - i < kLanes ? n - i : kLanes)) - 1);
+}
+
+// Lanes that are set, one after the other.
+HWY_INLINE VI lane_order(Bits bits) {
+  if constexpr (kLanes > 8) return hn::Compress(hn::Iota(di, 0), as_int(mask_of(bits)));
+  const hn::Rebind<uint8_t, DI> bytes;
+  return hn::PromoteTo(di, hn::LoadU(bytes, reinterpret_cast<const uint8_t*>(&kLaneOrders.of[bits & 255])));
+}
+
+// Moves lanes of a vector at i that are set to `at` and on.
+class Mover {
+ public:
+  HWY_INLINE Mover(size_t i, size_t at, Bits lanes) : Mover(i, at, lane_order(lanes)) {}
+  HWY_INLINE void operator()(const float* from, float* to) const { move(from, to, of_f_); }
+  HWY_INLINE void operator()(const int32_t* from, int32_t* to) const { move(from, to, of_i_); }
+  HWY_INLINE void operator()(const uint32_t* from, uint32_t* to) const { move(from, to, of_u_); }
+
+ private:
+  HWY_INLINE Mover(size_t i, size_t at, VI order)
+      : i_(i),
+        at_(at),
+        of_f_(hn::IndicesFromVec(df, order)),
+        of_i_(hn::IndicesFromVec(di, order)),
+        of_u_(hn::IndicesFromVec(du, order)) {}
+  template <typename T, class Indices>
+  HWY_INLINE void move(const T* from, T* to, Indices indices) const {
+    store(hn::TableLookupLanes(load(from + i_), indices), to + at_);
+  }
+  size_t i_, at_;
+  decltype(hn::IndicesFromVec(df, VI())) of_f_;
+  decltype(hn::IndicesFromVec(di, VI())) of_i_;
+  decltype(hn::IndicesFromVec(du, VI())) of_u_;
 };
-
-HWY_INLINE VF set(float x) { return hn::Set(df, x); }
-HWY_INLINE VI set_i(uint32_t x) { return hn::Set(di, static_cast<int32_t>(x)); }
-HWY_INLINE VU set_u(uint32_t x) { return hn::Set(du, x); }
-HWY_INLINE VF select(MF m, VF yes, VF no) { return hn::IfThenElse(m, yes, no); }
-HWY_INLINE VI select(MI m, VI yes, VI no) { return hn::IfThenElse(m, yes, no); }
-HWY_INLINE VU select(MU m, VU yes, VU no) { return hn::IfThenElse(m, yes, no); }
-HWY_INLINE MF as_float(MI m) { return hn::RebindMask(df, m); }
-HWY_INLINE MF as_float(MU m) { return hn::RebindMask(df, m); }
-HWY_INLINE MI as_int(MF m) { return hn::RebindMask(di, m); }
-HWY_INLINE MU as_uint(MF m) { return hn::RebindMask(du, m); }
-HWY_INLINE VF load(const float* from) { return hn::LoadU(df, from); }
-HWY_INLINE VI load(const int32_t* from) { return hn::LoadU(di, from); }
-HWY_INLINE VU load(const uint32_t* from) { return hn::LoadU(du, from); }
-HWY_INLINE void store(VF v, float* to) { hn::StoreU(v, df, to); }
-HWY_INLINE void store(VI v, int32_t* to) { hn::StoreU(v, di, to); }
-HWY_INLINE void store(VU v, uint32_t* to) { hn::StoreU(v, du, to); }
-
-HWY_INLINE Bits bits_of(MF mask) {
-  uint8_t bytes[8] = {};
-  hn::StoreMaskBits(df, mask, bytes);
-  uint64_t bits;
-  __builtin_memcpy(&bits, bytes, sizeof bits);
-  return bits & ((Bits{1} << kLanes) - 1);
-}
-HWY_INLINE MF mask_of(Bits bits) {
-  uint8_t bytes[8];
-  __builtin_memcpy(bytes, &bits, sizeof bytes);
-  return hn::LoadMaskBits(df, bytes);
-}
-HWY_INLINE MF first_lanes(size_t count) { return hn::FirstN(df, count < kLanes ? count : kLanes); }
-
-// A number of each bit that is set.
-#define LSP_FOR_BITS(i, bits)                                           \
-  for (Bits rest_##i = (bits); rest_##i != 0; rest_##i &= rest_##i - 1) \
-    if (const auto i = static_cast<size_t>(std::countr_zero(rest_##i)); true)
 
 // floor(q > 0 ? q : 0), held below n: lsp_cell_patch.
 HWY_INLINE VF patch_of(VF q, VF n) {
@@ -115,10 +89,6 @@ HWY_INLINE VF patch_of(VF q, VF n) {
   return select(hn::Lt(i, n), i, hn::Sub(n, set(1.0f)));
 }
 HWY_INLINE VF place_of(VF q, VF first) { return hn::Sub(hn::Mul(set(2.0f), hn::Sub(q, first)), set(1.0f)); }
-HWY_INLINE VF dot(const V3& a, const V3& b) {
-  return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));
-}
-HWY_INLINE VF along(const V3& v, MF is_x, MF is_y) { return select(is_x, v.x, select(is_y, v.y, v.z)); }
 HWY_INLINE V3 corner_of(VI x, VI y, VI z) {
   return {hn::ConvertTo(df, x), hn::ConvertTo(df, y), hn::ConvertTo(df, z)};
 }
@@ -126,62 +96,13 @@ HWY_INLINE V3 corner_of(VI x, VI y, VI z) {
 HWY_INLINE V3 point_at(const V3& o, const V3& d, VF t) {
   return {hn::Add(o.x, hn::Mul(d.x, t)), hn::Add(o.y, hn::Mul(d.y, t)), hn::Add(o.z, hn::Mul(d.z, t))};
 }
-HWY_INLINE V3 minus(const V3& a, const V3& b) {
-  return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
-}
-
-// Arrays of the scene; one that is empty has a zero element, which is what is read beyond the end of any.
+// Arrays of the scene, see or_zero.
 struct Arrays {
   const LspFilledCell* cells;
   const LspPlane* planes;
   const LspSplit* splits;
   VU cell_count, plane_count, split_count, word_count;
 };
-template <typename T>
-HWY_INLINE const T* or_zero(const T* array, uint32_t count) {
-  static const T zero{};
-  return count != 0 ? array : &zero;
-}
-
-// Four words a lane, from first + lane's index * kWords on; zero where the index is beyond the end.
-template <size_t kWords>
-HWY_INLINE void load_records(const uint32_t* first, VU index, VU count, VU out[4]) {
-  const MU there = hn::Lt(index, count);
-  HWY_ALIGN uint32_t at[kLanes];
-  hn::Store(hn::IfThenElseZero(there, index), du, at);
-  const hn::CappedTag<uint32_t, 4> d4;
-  const hn::Repartition<uint64_t, DU> d64;
-  VU row[4];  // block b of row k: the record of lane 4 b + k
-  for (size_t k = 0; k < 4; ++k) {
-    const auto record = [&](size_t lane) HWY_ATTR {
-      return hn::LoadU(d4, first + static_cast<size_t>(at[lane]) * kWords);
-    };
-    if constexpr (kLanes == 4) {
-      row[k] = record(k);
-    } else if constexpr (kLanes == 8) {
-      row[k] = hn::Combine(du, record(4 + k), record(k));
-    } else {
-      const hn::Half<DU> half;
-      row[k] = hn::Combine(du, hn::Combine(half, record(12 + k), record(8 + k)),
-                           hn::Combine(half, record(4 + k), record(k)));
-    }
-  }
-  const auto low = [&](VU a, VU b) HWY_ATTR { return hn::BitCast(d64, hn::InterleaveLower(du, a, b)); };
-  const auto high = [&](VU a, VU b) HWY_ATTR { return hn::BitCast(d64, hn::InterleaveUpper(du, a, b)); };
-  const auto low_01 = low(row[0], row[1]), low_23 = low(row[2], row[3]);
-  const auto high_01 = high(row[0], row[1]), high_23 = high(row[2], row[3]);
-  out[0] = hn::BitCast(du, hn::InterleaveLower(d64, low_01, low_23));
-  out[1] = hn::BitCast(du, hn::InterleaveUpper(d64, low_01, low_23));
-  out[2] = hn::BitCast(du, hn::InterleaveLower(d64, high_01, high_23));
-  out[3] = hn::BitCast(du, hn::InterleaveUpper(d64, high_01, high_23));
-  for (size_t k = 0; k < 4; ++k) out[k] = hn::IfThenElseZero(there, out[k]);
-}
-
-// A word a lane; zero where the index is beyond the end. The index is below 2^31.
-HWY_INLINE VU load_words(const uint32_t* words, VU index, MU there) {
-  return hn::IfThenElseZero(there,
-                            hn::GatherIndex(du, words, hn::BitCast(di, hn::IfThenElseZero(there, index))));
-}
 
 }  // namespace
 }  // namespace HWY_NAMESPACE

@@ -1,5 +1,6 @@
-// Triangles across lanes, four at a time: for trace_wide_lanes.cpp and wide_exact-inl.h. The test is
-// lsp_triangle (lsp/traverse.h), operation by operation: a lane has the bits of a single triangle.
+// Triangles across lanes: for trace_wide_lanes.cpp, four of a leaf at a time, and wide_calls-inl.h, one of
+// every ray. The test is lsp_triangle (lsp/traverse.h), operation by operation: a lane has the bits of a
+// single triangle.
 #if defined(LSP_WIDE_TRIANGLES_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef LSP_WIDE_TRIANGLES_INL_H
 #undef LSP_WIDE_TRIANGLES_INL_H
@@ -52,42 +53,94 @@ HWY_INLINE V max_of(V a, V b) {
 #endif
 }
 
-struct P4 {
-  V4 x, y, z;
+// A point or vector a lane.
+template <class D>
+struct Points {
+  hn::Vec<D> x, y, z;
 };
-HWY_INLINE P4 minus(const P4& a, const P4& b) {
+template <class D>
+HWY_INLINE Points<D> minus(const Points<D>& a, const Points<D>& b) {
   return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
 }
-HWY_INLINE P4 times(const P4& a, V4 b) { return {hn::Mul(a.x, b), hn::Mul(a.y, b), hn::Mul(a.z, b)}; }
-HWY_INLINE P4 select(M4 m, const P4& a, const P4& b) {
+template <class D>
+HWY_INLINE Points<D> plus(const Points<D>& a, const Points<D>& b) {
+  return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)};
+}
+template <class D>
+HWY_INLINE Points<D> cross(const Points<D>& a, const Points<D>& b) {
+  return {hn::Sub(hn::Mul(a.y, b.z), hn::Mul(a.z, b.y)), hn::Sub(hn::Mul(a.z, b.x), hn::Mul(a.x, b.z)),
+          hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x))};
+}
+template <class D>
+HWY_INLINE Points<D> times(const Points<D>& a, hn::Vec<D> b) {
+  return {hn::Mul(a.x, b), hn::Mul(a.y, b), hn::Mul(a.z, b)};
+}
+template <class D>
+HWY_INLINE Points<D> select(hn::Mask<D> m, const Points<D>& a, const Points<D>& b) {
   return {hn::IfThenElse(m, a.x, b.x), hn::IfThenElse(m, a.y, b.y), hn::IfThenElse(m, a.z, b.z)};
 }
-HWY_INLINE V4 dot(const P4& a, const P4& b) {
+template <class D>
+HWY_INLINE hn::Vec<D> dot(const Points<D>& a, const Points<D>& b) {
   return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));
 }
-HWY_INLINE V4 largest(const P4& a) { return max_of(max_of(hn::Abs(a.x), hn::Abs(a.y)), hn::Abs(a.z)); }
+template <class D>
+HWY_INLINE hn::Vec<D> largest(const Points<D>& a) {
+  return max_of(max_of(hn::Abs(a.x), hn::Abs(a.y)), hn::Abs(a.z));
+}
 
-// lsp_plane_depth of four.
-HWY_INLINE V4 plane_depth(const P4& direction, V4 shear_z, const P4& a, const P4& b, const P4& c) {
-  const hn::RebindToUnsigned<D4> du;
-  const P4 ab = minus(b, a), bc = minus(c, b), ca = minus(a, c);
-  const V4 length_ab = largest(ab), length_bc = largest(bc), length_ca = largest(ca);
-  const M4 at_a = hn::And(hn::Ge(length_bc, length_ab), hn::Ge(length_bc, length_ca));
-  const M4 at_b = hn::Ge(length_ca, length_ab);
-  const P4 p = select(at_a, a, select(at_b, b, c));
-  const P4 e = select(at_a, ab, select(at_b, bc, ca));
-  const P4 f = select(at_a, ca, select(at_b, ab, bc));
+// lsp_plane_depth.
+template <class D>
+HWY_INLINE hn::Vec<D> plane_depth(const Points<D>& direction, hn::Vec<D> shear_z, const Points<D>& a,
+                                  const Points<D>& b, const Points<D>& c) {
+  using V = hn::Vec<D>;
+  using M = hn::Mask<D>;
+  const D d;
+  const hn::RebindToUnsigned<D> du;
+  const Points<D> ab = minus(b, a), bc = minus(c, b), ca = minus(a, c);
+  const V length_ab = largest(ab), length_bc = largest(bc), length_ca = largest(ca);
+  const M at_a = hn::And(hn::Ge(length_bc, length_ab), hn::Ge(length_bc, length_ca));
+  const M at_b = hn::Ge(length_ca, length_ab);
+  const Points<D> p = select<D>(at_a, a, select<D>(at_b, b, c));
+  const Points<D> e = select<D>(at_a, ab, select<D>(at_b, bc, ca));
+  const Points<D> f = select<D>(at_a, ca, select<D>(at_b, ab, bc));
   const auto longest = hn::BitCast(du, max_of(max_of(length_ab, length_bc), length_ca));
   const auto exponent =
       hn::Min(hn::Max(hn::ShiftRight<23>(longest), hn::Set(du, uint32_t{1})), hn::Set(du, uint32_t{253}));
-  const V4 shrink = hn::BitCast(d4, hn::ShiftLeft<23>(hn::Sub(hn::Set(du, uint32_t{254}), exponent)));
-  const P4 g = times(e, shrink), h = times(f, shrink);
-  const P4 n = {hn::Sub(hn::Mul(g.y, h.z), hn::Mul(g.z, h.y)), hn::Sub(hn::Mul(g.z, h.x), hn::Mul(g.x, h.z)),
-                hn::Sub(hn::Mul(g.x, h.y), hn::Mul(g.y, h.x))};
-  const V4 t = hn::Div(dot(n, p), dot(n, direction));
-  const V4 za = hn::Mul(a.z, shear_z), zb = hn::Mul(b.z, shear_z), zc = hn::Mul(c.z, shear_z);
+  const V shrink = hn::BitCast(d, hn::ShiftLeft<23>(hn::Sub(hn::Set(du, uint32_t{254}), exponent)));
+  const Points<D> g = times<D>(e, shrink), h = times<D>(f, shrink);
+  const Points<D> n = cross(g, h);
+  const V t = hn::Div(dot(n, p), dot(n, direction));
+  const V za = hn::Mul(a.z, shear_z), zb = hn::Mul(b.z, shear_z), zc = hn::Mul(c.z, shear_z);
   return min_of(max_of(max_of(za, zb), zc), max_of(min_of(min_of(za, zb), zc), t));
 }
+
+// Whether lines pass through triangles: lsp_triangle up to the determinant.
+template <class D>
+struct Passages {
+  hn::Vec<D> v, w, det;
+  hn::Mask<D> met;
+};
+template <class D>
+HWY_INLINE Passages<D> pass(const Points<D>& a, const Points<D>& b, const Points<D>& c, hn::Vec<D> shear_x,
+                            hn::Vec<D> shear_y) {
+  using V = hn::Vec<D>;
+  using M = hn::Mask<D>;
+  const D d;
+  const V ax = hn::Sub(a.x, hn::Mul(shear_x, a.z)), ay = hn::Sub(a.y, hn::Mul(shear_y, a.z));
+  const V bx = hn::Sub(b.x, hn::Mul(shear_x, b.z)), by = hn::Sub(b.y, hn::Mul(shear_y, b.z));
+  const V cx = hn::Sub(c.x, hn::Mul(shear_x, c.z)), cy = hn::Sub(c.y, hn::Mul(shear_y, c.z));
+  const V u = hn::Sub(hn::Mul(cx, by), hn::Mul(cy, bx));
+  const V v = hn::Sub(hn::Mul(ax, cy), hn::Mul(ay, cx));
+  const V w = hn::Sub(hn::Mul(bx, ay), hn::Mul(by, ax));
+  const V zero = hn::Zero(d), det = hn::Add(hn::Add(u, v), w);
+  // Of a NaN among them the determinant is one.
+  const M below = hn::Lt(hn::Min(hn::Min(u, v), w), zero), above = hn::Gt(hn::Max(hn::Max(u, v), w), zero);
+  // Finite and not zero; no number is neither less.
+  const M sound = hn::And(hn::Lt(hn::Abs(det), hn::Set(d, HUGE_VALF)), hn::Gt(hn::Abs(det), zero));
+  return {v, w, det, hn::AndNot(hn::And(below, above), sound)};
+}
+
+using P4 = Points<D4>;
 
 // Bytes of a corner whose axes are rotated so that the ray's comes last: lsp_rotate.
 alignas(16) constexpr uint8_t kRotations[3][16] = {
@@ -125,7 +178,7 @@ HWY_INLINE void keep_nearest(const lsp_scene& scene, const LspTriangle* const (&
                              V4 w, V4 det, NumberOf number_of, typename Text::LspBest& best) {
   const P4 direction = {hn::Set(d4, r.direction[0]), hn::Set(d4, r.direction[1]),
                         hn::Set(d4, r.direction[2])};
-  const V4 t = plane_depth(direction, hn::Set(d4, r.shear[2]), a, b, c);
+  const V4 t = plane_depth<D4>(direction, hn::Set(d4, r.shear[2]), a, b, c);
   met &= mask_bits(d4, hn::And(hn::Gt(t, hn::Set(d4, r.tmin)), hn::Le(t, hn::Set(d4, best.t))));
   if (met == 0) return;
   HWY_ALIGN float ts[kLeafLanes], vs[kLeafLanes], ws[kLeafLanes], dets[kLeafLanes];
@@ -169,21 +222,9 @@ HWY_INLINE void hit_triangles(const lsp_scene& scene, const LspTriangle* const (
               hn::Sub(z, hn::Set(d4, r.origin[2]))};
   };
   const P4 a = corner(0), b = corner(1), c = corner(2);
-  const V4 shear_x = hn::Set(d4, r.shear[0]), shear_y = hn::Set(d4, r.shear[1]);
-  const V4 ax = hn::Sub(a.x, hn::Mul(shear_x, a.z)), ay = hn::Sub(a.y, hn::Mul(shear_y, a.z));
-  const V4 bx = hn::Sub(b.x, hn::Mul(shear_x, b.z)), by = hn::Sub(b.y, hn::Mul(shear_y, b.z));
-  const V4 cx = hn::Sub(c.x, hn::Mul(shear_x, c.z)), cy = hn::Sub(c.y, hn::Mul(shear_y, c.z));
-  const V4 u = hn::Sub(hn::Mul(cx, by), hn::Mul(cy, bx));
-  const V4 v = hn::Sub(hn::Mul(ax, cy), hn::Mul(ay, cx));
-  const V4 w = hn::Sub(hn::Mul(bx, ay), hn::Mul(by, ax));
-  const V4 zero = hn::Zero(d4);
-  const V4 det = hn::Add(hn::Add(u, v), w);
-  // Of a NaN among them the determinant is one.
-  const M4 below = hn::Lt(hn::Min(hn::Min(u, v), w), zero), above = hn::Gt(hn::Max(hn::Max(u, v), w), zero);
-  // Finite and not zero; no number is neither less.
-  const M4 sound = hn::And(hn::Lt(hn::Abs(det), hn::Set(d4, HUGE_VALF)), hn::Gt(hn::Abs(det), zero));
-  const uint32_t met = mask_bits(d4, hn::AndNot(hn::And(below, above), sound)) & ((1u << count) - 1);
-  if (met != 0) keep_nearest<Text>(scene, records, met, r, a, b, c, v, w, det, number_of, best);
+  const Passages<D4> p = pass<D4>(a, b, c, hn::Set(d4, r.shear[0]), hn::Set(d4, r.shear[1]));
+  const uint32_t met = mask_bits(d4, p.met) & ((1u << count) - 1);
+  if (met != 0) keep_nearest<Text>(scene, records, met, r, a, b, c, p.v, p.w, p.det, number_of, best);
 }
 
 }  // namespace

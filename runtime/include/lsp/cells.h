@@ -9,7 +9,7 @@
  * own small tree, and goes on from there. A ray that misses everything, but leaves the cell it begins in by a way on
  * which the bake found no sky (LspFilledCell.closed), begins again, and every cell is traced exactly.
  *
- * runtime/src/trace_cells_wide.cpp and wide_exact-inl.h state this a second time for rays in vector lanes, operation by
+ * runtime/src/trace_cells_wide.cpp and wide_calls-inl.h state this a second time for rays in vector lanes, operation by
  * operation: what changes here changes there.
  *
  * Everything but the exact trace counts in cells: positions from the grid's lower corner, lengths in edges.
