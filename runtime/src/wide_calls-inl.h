@@ -17,10 +17,6 @@
 HWY_BEFORE_NAMESPACE();
 namespace lsp {
 namespace HWY_NAMESPACE {
-#ifndef LSPT_A
-#define LSPT_A 1
-#define LSPT_B 1
-#endif
 namespace {
 
 // Rays under way, a value a lane: where they have come.
@@ -273,9 +269,9 @@ class Calls {
     const MU known = hn::And(at_leaf, hn::Ne(load(next_ + i), set_u(LSP_NONE)));
     const Bits ready = bits_of(as_float(known));
     const int others = std::popcount(nodes);
-    if (ready != 0 && std::popcount(ready) * LSPT_A >= others * LSPT_B)
+    if (ready != 0 && std::popcount(ready) >= others)
       test(i, known, ref);
-    else if (leaves != 0 && std::popcount(leaves) * LSPT_A >= others * LSPT_B)
+    else if (leaves != 0 && std::popcount(leaves) >= others)
       look(i, at_leaf, ref);
     return bits_of(as_float(here)) & ~leaves & ~nodes;
   }
