@@ -23,8 +23,7 @@ std::vector<lsp_vulkan_asset> describe(const Instances& instances, const lsp_vul
     const lsp_trace_options exact{};
     lsp_vulkan_plan plan;
     lsp_error error;
-    lsp_status status =
-        lsp_vulkan_plan_buffers(scene, LSP_USE_EXACT | LSP_USE_ADDRESSES_ALWAYS, &limits, &plan, &error);
+    lsp_status status = lsp_vulkan_plan_buffers(scene, LSP_USE_EXACT, &limits, &plan, &error);
     if (status == LSP_OK)
       status = lsp_vulkan_describe_asset(scene, &plan, nowhere, &exact, &assets.emplace_back(), &error);
     if (status != LSP_OK) throw Failure(static_cast<Exit>(status), "", error.message);
@@ -35,11 +34,12 @@ std::vector<lsp_vulkan_asset> describe(const Instances& instances, const lsp_vul
 void run(Device& device, const Buffer& assets, const Buffer& instances, const Buffer& hits,
          const Buffer& offsets, uint32_t count) {
   constexpr VkPipelineBindPoint kCompute = VK_PIPELINE_BIND_POINT_COMPUTE;
-  constexpr lsp_vulkan_kind kKind{0, 1, 0, 0, 0};  // no trace, but a stack has an entry at least
+  constexpr lsp_vulkan_kind kKind{0, 1, 0, 0, 0, 0};  // no trace, but a stack has an entry at least
   TraceShader shader(device, 1);
   const VkDescriptorSet set = shader.allocate_set();
   lsp_vulkan_write_instance_descriptors(&device.functions, device.handle, set, assets.handle(),
-                                        instances.handle(), hits.handle(), offsets.handle(), VK_NULL_HANDLE);
+                                        instances.handle(), VK_NULL_HANDLE, hits.handle(), offsets.handle(),
+                                        VK_NULL_HANDLE);
   const VkPipeline pipeline = shader.create_pipeline(instance_offset, sizeof instance_offset, kKind);
   Commands commands(device);
   const VkCommandBuffer recorded = commands.record();
@@ -54,9 +54,7 @@ void run(Device& device, const Buffer& assets, const Buffer& instances, const Bu
 }  // namespace
 
 std::vector<float> offsets_on_device(const Instances& instances, const std::vector<LspHit>& hits) {
-  VulkanOptions options;
-  options.addresses = true;  // without them this throws
-  Device device(options);
+  Device device(VulkanOptions{});
   const std::vector<lsp_vulkan_asset> described = describe(instances, device.limits);
   const Buffer assets = host_buffer(device, described.size() * sizeof described[0], described.data());
   const Buffer placed = host_buffer(device, lsp_instances_bytes(instances.size()), instances.view().records);

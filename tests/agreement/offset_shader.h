@@ -7,8 +7,8 @@
 
 namespace lsp::test {
 
-// The offsets of hits of these instances. Throws lsp::Failure where there is no Vulkan device with buffer
-// addresses (kUnsupported).
+// The offsets of hits of these instances. Throws lsp::Failure where there is no Vulkan device
+// (kUnsupported).
 std::vector<float> offsets_on_device(const Instances& instances, const std::vector<LspHit>& hits);
 
 }  // namespace lsp::test

@@ -156,6 +156,26 @@ TEST_F(InstanceShader, EveryKindOfRay) {
   expect_same_bits(tracer, instances, {kApproximate, 0});
 }
 
+// Each asset in buffers of its own, by their addresses: where that is asked for, and of imported files.
+TEST_F(InstanceShader, ThroughAddresses) {
+  const std::vector<const lsp_scene*> scenes = {&assets().ball->scene(), &assets().soup->scene()};
+  const Instances instances(scenes, places_of(2, 40, 37));
+  VulkanOptions options;
+  options.addresses = true;
+  VulkanTracer tracer(options);
+  for (const LoadPath path : {LoadPath::kUpload, LoadPath::kImport}) {
+    try {
+      tracer.load(scenes, LSP_USE_EXACT | LSP_USE_APPROXIMATE, path);
+    } catch (const Failure& failure) {
+      ASSERT_EQ(path, LoadPath::kImport) << failure.what();
+      std::cout << "not imported: " << failure.what() << "\n";
+      continue;
+    }
+    EXPECT_EQ(tracer.load_path(), path);
+    for (const uint32_t flags : {0u, kApproximate}) expect_same_bits(tracer, instances, {flags, 0});
+  }
+}
+
 // Where no asset has tables approximate rays are exact, and what is loaded for them will do for both; where
 // one has nothing but tables all rays are approximate.
 TEST_F(InstanceShader, OneKindOfAsset) {
@@ -176,7 +196,7 @@ TEST_F(InstanceShader, OneKindOfAsset) {
 }
 
 // Where tables alone are loaded their dial is that of tables alone, whatever is asked for: what cells need
-// besides is at address 0.
+// besides is not there.
 TEST_F(InstanceShader, TablesAlone) {
   const std::vector<const lsp_scene*> scenes = {&assets().ball->scene(), &assets().sheet->scene()};
   const Instances instances(scenes, places_of(2, 30, 47));

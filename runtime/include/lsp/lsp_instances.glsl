@@ -1,9 +1,7 @@
 /* Of lsp.glsl with LSP_INSTANCES defined: traces rays through instances (lsp/lsp_instances.h), the tree over them and
  * the assets in one shader, with the bits of lsp_trace_instances. Assets are any mixture of what bakes make by default:
- * cells, whose exact rays walk wide nodes, and wide nodes alone. The including shader needs
+ * cells, whose exact rays walk wide nodes, and wide nodes alone.
  *
- *   #extension GL_EXT_buffer_reference : require
- *   #extension GL_EXT_buffer_reference_uvec2 : require
  *   #define LSP_INSTANCES
  *   #include "lsp/lsp.glsl"
  *
@@ -14,9 +12,10 @@
  *
  *   LspHit hit = lsp_trace(lsp_asset(number), ray, LSP_TRACE_APPROXIMATE);
  *
- * `count` is that of the instances, 0 allowed. Bindings, both read-only storage buffers:
+ * `count` is that of the instances, 0 allowed. Bindings, all read-only storage buffers:
  *   +0 the assets, an lsp_vulkan_asset each, in the order in which instances number them
  *   +1 the memory that lsp_instances_build has filled, as it is
+ *   +2 +3 +4 the pool, one buffer with the sections of all assets; with LSP_ADDRESSES none, see lsp_sections.glsl
  * LSP_SET, LSP_FIRST_BINDING, the stack and the parts are those of lsp.glsl, of all assets together: the largest stack,
  * every part that any of them needs. Flags that are a constant leave out what they do not need.
  */
@@ -95,7 +94,7 @@ LspPlace lsp_load_place(uint i) {
   return LspPlace(a.xyz, vec3(a.w, b.xy), vec3(b.zw, c.x), c.yzw, d.xyz);
 }
 
-LspScene lsp_asset(uint number) { return LspScene(lsp_assets[number].sections, number); }
+LspScene lsp_asset(uint number) { return LspScene(lsp_assets[number].sections, number, lsp_assets[number].header); }
 LspScene lsp_asset_of(uint instance) { return lsp_asset(lsp_instance_words[10u * instance].x); }
 
 /* Traces a ray in an asset's own space. What both texts do alike is done once: that halves what a device compiles. */
