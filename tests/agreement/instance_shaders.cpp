@@ -1,7 +1,8 @@
-#include "offset_shader.h"
+#include "instance_shaders.h"
 
 #include <cstring>
 
+#include "scene_buffers.h"
 #include "trace_shader.h"
 
 namespace lsp::test {
@@ -9,38 +10,54 @@ namespace {
 
 #include "shaders.inc"
 
+void or_throw(lsp_status status, const lsp_error& error) {
+  if (status != LSP_OK) throw Failure(static_cast<Exit>(status), "", error.message);
+}
+
 Buffer host_buffer(Device& device, uint64_t bytes, const void* contents) {
   Buffer buffer(device, bytes, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, kHostMemory, 0);
   if (contents != nullptr) std::memcpy(buffer.mapped(), contents, bytes);
   return buffer;
 }
 
-// The shader looks at headers alone: the sections need not be anywhere.
-std::vector<lsp_vulkan_asset> describe(const Instances& instances, const lsp_vulkan_limits& limits) {
+// Assets on the device, and what a pipeline for rays of these options is made of.
+struct Described {
+  Buffer pool;
+  Buffer assets;
+  lsp_vulkan_kind kind{};
+};
+
+Described describe(Device& device, const std::vector<const lsp_scene*>& scenes,
+                   const lsp_trace_options& options) {
+  Described result;
+  lsp_error error;
+  std::vector<lsp_vulkan_plan> plans;
   std::vector<lsp_vulkan_asset> assets;
-  for (const lsp_scene* scene : instances.assets()) {
-    const VkDeviceAddress nowhere[LSP_VULKAN_MAX_BUFFERS] = {};
-    const lsp_trace_options exact{};
-    lsp_vulkan_plan plan;
-    lsp_error error;
-    lsp_status status = lsp_vulkan_plan_buffers(scene, LSP_USE_EXACT, &limits, &plan, &error);
-    if (status == LSP_OK)
-      status = lsp_vulkan_describe_asset(scene, &plan, nowhere, &exact, &assets.emplace_back(), &error);
-    if (status != LSP_OK) throw Failure(static_cast<Exit>(status), "", error.message);
+  const std::vector<SceneBuffers> buffers =
+      SceneBuffers::upload_pool(device, scenes, LSP_USE_EXACT | LSP_USE_APPROXIMATE, false, result.pool);
+  for (size_t i = 0; i < scenes.size(); ++i) {
+    plans.push_back(buffers[i].plan());
+    or_throw(lsp_vulkan_describe_asset(scenes[i], &plans[i], buffers[i].places(), &options,
+                                       &assets.emplace_back(), &error),
+             error);
   }
-  return assets;
+  or_throw(lsp_vulkan_plan_instances(scenes.data(), plans.data(), static_cast<uint32_t>(plans.size()),
+                                     &options, &result.kind, &error),
+           error);
+  result.assets = host_buffer(device, assets.size() * sizeof assets[0], assets.data());
+  return result;
 }
 
-void run(Device& device, const Buffer& assets, const Buffer& instances, const Buffer& hits,
-         const Buffer& offsets, uint32_t count) {
+// `from` is bound where the trace shader reads rays, `to` where it writes hits.
+void run(Device& device, const Described& described, VkBuffer instances, const uint32_t* words, size_t bytes,
+         const Buffer& from, const Buffer& to, uint32_t count) {
   constexpr VkPipelineBindPoint kCompute = VK_PIPELINE_BIND_POINT_COMPUTE;
-  constexpr lsp_vulkan_kind kKind{0, 1, 0, 0, 0, 0};  // no trace, but a stack has an entry at least
   TraceShader shader(device, 1);
   const VkDescriptorSet set = shader.allocate_set();
-  lsp_vulkan_write_instance_descriptors(&device.functions, device.handle, set, assets.handle(),
-                                        instances.handle(), VK_NULL_HANDLE, hits.handle(), offsets.handle(),
+  lsp_vulkan_write_instance_descriptors(&device.functions, device.handle, set, described.assets.handle(),
+                                        instances, described.pool.handle(), from.handle(), to.handle(),
                                         VK_NULL_HANDLE);
-  const VkPipeline pipeline = shader.create_pipeline(instance_offset, sizeof instance_offset, kKind);
+  const VkPipeline pipeline = shader.create_pipeline(words, bytes, described.kind);
   Commands commands(device);
   const VkCommandBuffer recorded = commands.record();
   device.vk.vkCmdBindPipeline(recorded, kCompute, pipeline);
@@ -55,14 +72,28 @@ void run(Device& device, const Buffer& assets, const Buffer& instances, const Bu
 
 std::vector<float> offsets_on_device(const Instances& instances, const std::vector<LspHit>& hits) {
   Device device(VulkanOptions{});
-  const std::vector<lsp_vulkan_asset> described = describe(instances, device.limits);
-  const Buffer assets = host_buffer(device, described.size() * sizeof described[0], described.data());
+  const Described described = describe(device, instances.assets(), {});
   const Buffer placed = host_buffer(device, lsp_instances_bytes(instances.size()), instances.view().records);
   const Buffer given = host_buffer(device, hits.size() * sizeof(LspHit), hits.data());
   std::vector<float> result(hits.size());
   const Buffer offsets = host_buffer(device, result.size() * sizeof(float), nullptr);
-  run(device, assets, placed, given, offsets, static_cast<uint32_t>(hits.size()));
+  run(device, described, placed.handle(), instance_offset, sizeof instance_offset, given, offsets,
+      static_cast<uint32_t>(hits.size()));
   std::memcpy(result.data(), offsets.mapped(), result.size() * sizeof(float));
+  return result;
+}
+
+std::vector<LspHit> hits_in_assets(const std::vector<const lsp_scene*>& assets,
+                                   const lsp_trace_options& options, const std::vector<LspRay>& rays) {
+  Device device(VulkanOptions{});
+  const Described described = describe(device, assets, options);
+  const Buffer given = host_buffer(device, rays.size() * sizeof(LspRay), rays.data());
+  std::vector<LspHit> result(rays.size());
+  const Buffer hits = host_buffer(device, result.size() * sizeof(LspHit), nullptr);
+  // There are no instances: any buffer will do.
+  run(device, described, given.handle(), asset_trace, sizeof asset_trace, given, hits,
+      static_cast<uint32_t>(rays.size()));
+  std::memcpy(result.data(), hits.mapped(), result.size() * sizeof(LspHit));
   return result;
 }
 

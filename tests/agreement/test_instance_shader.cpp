@@ -11,12 +11,12 @@
 
 #include "bake.h"
 #include "hard_rays.h"
+#include "instance_shaders.h"
 #include "lsp/instances.hpp"
 #include "lsp/program.h"
 #include "lsp/scene_file.hpp"
 #include "lsp/vulkan_device.hpp"
 #include "meshes.h"
-#include "offset_shader.h"
 #include "writer.h"
 
 // Vulkan drivers and the loader leave memory behind.
@@ -38,7 +38,7 @@ std::unique_ptr<SceneFile> bake_file(const Mesh& mesh, uint32_t cells) {
   const std::string path =
       (fs::temp_directory_path() / ("lsp_test_instance_shader_" + std::to_string(getpid()) + ".lsp"))
           .string();
-  write_lsp(path, baked, "{}", {});
+  write_lsp(path, baked, "{}", {.alignment = 4096});  // or it cannot be imported
   auto file = std::make_unique<SceneFile>(path);
   fs::remove(path);
   return file;
@@ -212,6 +212,33 @@ TEST_F(InstanceShader, TablesAlone) {
   } catch (const Failure& failure) {
     EXPECT_EQ(failure.exit(), Exit::kUnsupported);
     EXPECT_STREQ(failure.what(), "asset 0: is not loaded for exact rays; load it for LSP_USE_EXACT");
+  }
+}
+
+// Several scenes in one dispatch that nothing places: each ray has the bits of lsp_trace of its own scene.
+TEST_F(InstanceShader, AssetsAlone) {
+  const std::vector<const lsp_scene*> scenes = {&assets().ball->scene(), &assets().soup->scene(),
+                                                &assets().sheet->scene()};
+  for (const uint32_t flags : {0u, kApproximate}) {
+    const lsp_trace_options options{flags, 0, LSP_QUALITY_FAST, 0};
+    std::vector<LspHit> hits;
+    try {
+      hits = hits_in_assets(scenes, options, rays_);
+    } catch (const Failure& failure) {
+      if (failure.exit() != Exit::kUnsupported) throw;
+      GTEST_SKIP() << failure.what();
+    }
+    size_t of_tables = 0, of_triangles = 0;
+    for (size_t i = 0; i < rays_.size() && !HasFailure(); ++i) {
+      LspHit expected;
+      ASSERT_EQ(lsp_trace(scenes[i % scenes.size()], &options, &rays_[i], &expected, 1, nullptr, nullptr),
+                LSP_OK);
+      EXPECT_EQ(memcmp(&hits[i], &expected, sizeof(LspHit)), 0) << i;
+      if (expected.primitive != LSP_NONE)
+        ++((expected.flags & LSP_HIT_LINE_SPACE) != 0 ? of_tables : of_triangles);
+    }
+    EXPECT_GT(flags == kApproximate ? of_tables : of_triangles, 50u);
+    EXPECT_EQ(of_tables > 0, flags == kApproximate);
   }
 }
 
