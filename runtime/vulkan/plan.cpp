@@ -265,7 +265,7 @@ extern "C" lsp_status lsp_vulkan_plan_instances(const lsp_scene* const* assets, 
     if (plans[i].addresses != plans[0].addresses) {
       *kind = {};
       return lsp::fail(error, LSP_ERROR_UNSUPPORTED, 0,
-                       "asset %u is planned %s addresses, asset 0 is not; plan all with "
+                       "asset %u is planned %s addresses, unlike asset 0; plan all with "
                        "LSP_USE_ADDRESSES_ALWAYS or none with LSP_USE_ADDRESSES_*",
                        i, plans[i].addresses != 0 ? "with" : "without");
     }

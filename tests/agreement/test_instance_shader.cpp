@@ -329,6 +329,39 @@ TEST_F(InstanceShader, AssetsAreLoadedOnce) {
   EXPECT_THROW(tracer.trace_instances(others.view(), {}, 0xFF, {&ray, 1}, {&hit, 1}), Failure);
 }
 
+// Assets lie in the pool one behind the other, as far as a storage buffer goes; all are read in one way.
+TEST(InstancePlan, PlacesAndTheirLimit) {
+  const std::vector<const lsp_scene*> scenes = {&assets().ball->scene(), &assets().soup->scene()};
+  lsp_vulkan_limits limits{1u << 27, 0, 65535, 0};
+  lsp_error error;
+  std::vector<lsp_vulkan_plan> plans(2);
+  VkDeviceAddress places[2][LSP_VULKAN_MAX_BUFFERS];
+  uint64_t bytes = 0, end = 0;
+  for (size_t i = 0; i < 2; ++i) {
+    ASSERT_EQ(lsp_vulkan_plan_buffers(scenes[i], LSP_USE_EXACT, &limits, &plans[i], &error), LSP_OK);
+    ASSERT_EQ(lsp_vulkan_place_buffers(&plans[i], &limits, &bytes, places[i], &error), LSP_OK);
+    for (uint32_t k = 0; k < plans[i].buffer_count; ++k) {
+      EXPECT_EQ(places[i][k] % 256, 0u);
+      EXPECT_GE(places[i][k], end);
+      end = places[i][k] + plans[i].buffers[k].bytes;
+    }
+    EXPECT_EQ(bytes, end);
+  }
+  limits.max_storage_buffer_range = bytes - 1;
+  uint64_t first = places[1][0];
+  EXPECT_EQ(lsp_vulkan_place_buffers(&plans[1], &limits, &first, places[1], &error), LSP_ERROR_LIMIT);
+  EXPECT_EQ(first, places[1][0]);
+  EXPECT_NE(std::string(error.message).find("maxStorageBufferRange"), std::string::npos) << error.message;
+
+  const uint32_t by_addresses = LSP_USE_EXACT | LSP_USE_ADDRESSES_ALWAYS;
+  ASSERT_EQ(lsp_vulkan_plan_buffers(scenes[1], by_addresses, &limits, &plans[1], &error), LSP_OK);
+  const lsp_trace_options exact{};
+  lsp_vulkan_kind kind;
+  EXPECT_EQ(lsp_vulkan_plan_instances(scenes.data(), plans.data(), 2, &exact, &kind, &error),
+            LSP_ERROR_UNSUPPORTED);
+  EXPECT_EQ(std::string(error.message).rfind("asset 1 is planned with addresses", 0), 0u) << error.message;
+}
+
 TEST_F(InstanceShader, ValidationHasNothingToSay) {
   VulkanOptions options;
   options.validation = true;

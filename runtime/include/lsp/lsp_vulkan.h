@@ -45,7 +45,7 @@ extern "C" {
 /* And whether sections may be read through buffer device addresses instead of descriptors, where the device's
  * bufferDeviceAddress feature is on. */
 #define LSP_USE_ADDRESSES_IF_NEEDED 0x100u /* where one is larger than max_storage_buffer_range */
-#define LSP_USE_ADDRESSES_ALWAYS 0x200u    /* for tests: descriptors are faster */
+#define LSP_USE_ADDRESSES_ALWAYS 0x200u    /* descriptors are faster; for some assets of instances, below */
 
 /* The header's, and one a section that binds. */
 enum {
