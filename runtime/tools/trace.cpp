@@ -44,8 +44,7 @@ void define(CLI::App& app, Options& options) {
                  "flags uint32, from bit 8 on the instance's number")
       ->required();
   app.add_option("--backend", options.backend,
-                 "Where to trace; of a scene of instances vulkan needs buffer addresses, and assets with "
-                 "cells or wide nodes")
+                 "Where to trace; of a scene of instances vulkan needs assets with cells or wide nodes")
       ->check(CLI::IsMember({"cpu", "vulkan"}));
   app.add_option("--mode", options.mode,
                  "Down to triangles or by Line Spaces; without it by Line Spaces if there are any")

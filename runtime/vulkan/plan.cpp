@@ -229,6 +229,7 @@ extern "C" lsp_status lsp_vulkan_plan_trace(const lsp_scene* scene, const lsp_vu
   kind->base_structure = approximate ? plan->base_structure : plan->exact_structure;
   kind->stack = header.max_stack > 1 ? header.max_stack : 1;
   kind->flags = flags;
+  kind->addresses = plan->addresses;
   kind->dial = !cells ? 0 : exact_cells ? lsp_dial(scene, options) : LSP_DIAL_TABLES;
   kind->parts = lsp_vulkan_parts(scene);
   if (cells && kind->dial == LSP_DIAL_TABLES) kind->parts &= ~LSP_PART_CELL_EXACT;
@@ -238,10 +239,6 @@ extern "C" lsp_status lsp_vulkan_plan_trace(const lsp_scene* scene, const lsp_vu
 // What kind of trace options ask for of an asset, by the shader of instances.
 static lsp_status plan_asset(const lsp_scene* asset, const lsp_vulkan_plan* plan,
                              const lsp_trace_options* options, lsp_vulkan_kind* kind, lsp_error* error) {
-  *kind = {};
-  if (plan->addresses == 0)
-    return lsp::fail(error, LSP_ERROR_UNSUPPORTED, 0,
-                     "is planned without addresses; plan it with LSP_USE_ADDRESSES_ALWAYS");
   const lsp_status status = lsp_vulkan_plan_trace(asset, plan, options, kind, error);
   if (status != LSP_OK) return status;
   const uint32_t structure = kind->base_structure;
@@ -265,6 +262,14 @@ extern "C" lsp_status lsp_vulkan_plan_instances(const lsp_scene* const* assets, 
       *kind = {};
       return lsp::fail(error, status, why.offset, "asset %u: %s", i, why.message);
     }
+    if (plans[i].addresses != plans[0].addresses) {
+      *kind = {};
+      return lsp::fail(error, LSP_ERROR_UNSUPPORTED, 0,
+                       "asset %u is planned %s addresses, unlike asset 0; plan all with "
+                       "LSP_USE_ADDRESSES_ALWAYS or none with LSP_USE_ADDRESSES_*",
+                       i, plans[i].addresses != 0 ? "with" : "without");
+    }
+    kind->addresses = of_asset.addresses;
     kind->stack = std::max(kind->stack, of_asset.stack);
     kind->flags |= of_asset.flags;
     kind->parts |= of_asset.parts;
@@ -275,15 +280,39 @@ extern "C" lsp_status lsp_vulkan_plan_instances(const lsp_scene* const* assets, 
 // As lsp_instances.glsl has it.
 static_assert(sizeof(lsp_vulkan_asset) == 480 && offsetof(lsp_vulkan_asset, header) == 96);
 
+// Of ranges of a buffer that are bound by themselves, the most that a device may ask for.
+constexpr uint64_t kPlaceAlignment = 256;
+
+extern "C" lsp_status lsp_vulkan_place_buffers(const lsp_vulkan_plan* plan, const lsp_vulkan_limits* limits,
+                                               uint64_t* pool_bytes, VkDeviceAddress* places,
+                                               lsp_error* error) {
+  uint64_t end = *pool_bytes;
+  for (uint32_t i = 0; i < plan->buffer_count; ++i) {
+    places[i] = (end + kPlaceAlignment - 1) / kPlaceAlignment * kPlaceAlignment;
+    end = places[i] + plan->buffers[i].bytes;
+  }
+  if (end > limits->max_storage_buffer_range)
+    return lsp::fail(
+        error, LSP_ERROR_LIMIT, 0,
+        "the assets up to it have %llu bytes, storage buffers of this device at most %llu "
+        "(maxStorageBufferRange); plan all with LSP_USE_ADDRESSES_ALWAYS or trace them on the CPU",
+        print(end), print(limits->max_storage_buffer_range));
+  *pool_bytes = end;
+  return lsp::succeed(error);
+}
+
 extern "C" lsp_status lsp_vulkan_describe_asset(const lsp_scene* scene, const lsp_vulkan_plan* plan,
-                                                const VkDeviceAddress* buffer_addresses,
+                                                const VkDeviceAddress* places,
                                                 const lsp_trace_options* options, lsp_vulkan_asset* asset,
                                                 lsp_error* error) {
   *asset = {};
   lsp_vulkan_kind kind;
   const lsp_status status = plan_asset(scene, plan, options, &kind, error);
   if (status != LSP_OK) return status;
-  lsp_vulkan_address_table(plan, buffer_addresses, asset->sections);
+  lsp_vulkan_address_table(plan, places, asset->sections);
+  // A place in the pool is counted in what the shader reads at once, so that 32 bits of it are enough.
+  if (plan->addresses == 0)
+    for (VkDeviceAddress& place : asset->sections) place /= 16;
   asset->header = *scene->header;
   asset->dial = kind.dial;
   return LSP_OK;

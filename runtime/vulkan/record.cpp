@@ -115,11 +115,12 @@ extern "C" void lsp_vulkan_write_descriptors(const lsp_vulkan_functions* functio
 
 extern "C" void lsp_vulkan_write_instance_descriptors(const lsp_vulkan_functions* functions, VkDevice device,
                                                       VkDescriptorSet set, VkBuffer assets,
-                                                      VkBuffer instances, VkBuffer rays, VkBuffer hits,
-                                                      VkBuffer counters) {
+                                                      VkBuffer instances, VkBuffer pool, VkBuffer rays,
+                                                      VkBuffer hits, VkBuffer counters) {
   VkBuffer bound[LSP_BINDING_COUNT];
   std::fill_n(bound, LSP_BINDING_COUNT, assets);
   bound[LSP_BINDING_INSTANCES] = instances;
+  if (pool != VK_NULL_HANDLE) std::fill_n(&bound[LSP_BINDING_POOL], 3, pool);
   write_bindings(*functions, device, set, bound, rays, hits, counters);
 }
 

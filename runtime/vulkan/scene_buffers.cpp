@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 #include <deque>
+#include <memory>
 #include <utility>
 
 namespace lsp {
@@ -56,6 +57,32 @@ class Ring {
   size_t next_ = 0;
 };
 
+// Where a buffer of a plan goes to: from `offset` of `buffer` on.
+struct Destination {
+  const Buffer* buffer;
+  VkDeviceSize offset;
+};
+
+// Copies the sections, straight into memory that the host sees, or else, or with `staging`, through a ring.
+void upload_sections(Device& device, const lsp_scene& scene, const lsp_vulkan_plan& plan,
+                     std::span<const Destination> to, bool staging) {
+  const auto is_hidden = [](const Destination& place) { return place.buffer->mapped() == nullptr; };
+  const bool staged = staging || std::ranges::any_of(to, is_hidden);
+  std::unique_ptr<Ring> ring;
+  if (staged) ring = std::make_unique<Ring>(device);
+  lsp_vulkan_copy piece;
+  for (uint64_t cursor = 0; lsp_vulkan_next_copy(&scene, &plan, kPieceBytes, &cursor, &piece) != 0;) {
+    const Destination& place = to[piece.buffer];
+    piece.buffer_offset += place.offset;
+    if (staged)
+      ring->copy(piece, place.buffer->handle());
+    else
+      memcpy(static_cast<unsigned char*>(place.buffer->mapped()) + piece.buffer_offset, piece.source,
+             piece.bytes);
+  }
+  if (staged) ring->finish();
+}
+
 // Creates a buffer that may lie in imported host memory.
 VkBuffer create_importable(Device& device, uint64_t bytes, VkBufferUsageFlags usage) {
   auto external =
@@ -94,7 +121,7 @@ SceneBuffers::SceneBuffers(SceneBuffers&& other) noexcept
       bytes_imported_(other.bytes_imported_),
       bytes_uploaded_(other.bytes_uploaded_) {
   std::copy(std::begin(other.handles_), std::end(other.handles_), handles_);
-  std::copy(std::begin(other.buffer_addresses_), std::end(other.buffer_addresses_), buffer_addresses_);
+  std::copy(std::begin(other.places_), std::end(other.places_), places_);
   std::fill(std::begin(other.handles_), std::end(other.handles_), VkBuffer{VK_NULL_HANDLE});
 }
 
@@ -160,21 +187,43 @@ SceneBuffers SceneBuffers::import_mapping(Device& device, const lsp_scene& scene
 SceneBuffers SceneBuffers::upload(Device& device, const lsp_scene& scene, uint32_t uses, bool staging) {
   SceneBuffers result(device);
   result.plan_ = make_plan(device, scene, uses);
-  bool mapped = true;
+  result.owned_.reserve(result.plan_.buffer_count);
+  std::vector<Destination> to;
   for (uint32_t i = 0; i < result.plan_.buffer_count; ++i) {
     result.owned_.emplace_back(device, result.plan_.buffers[i].bytes, result.plan_.usage,
                                VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT, staging ? 0 : kHostMemory);
     result.handles_[i] = result.owned_.back().handle();
-    mapped = mapped && result.owned_.back().mapped() != nullptr;
+    to.push_back({&result.owned_.back(), 0});
   }
-  if (mapped && !staging) {
-    result.upload_mapped(scene);
-  } else {
-    result.upload_staged(scene);
-  }
+  upload_sections(device, scene, result.plan_, to, staging);
   result.write_addresses();
   result.bytes_uploaded_ = result.plan_.bytes;
   return result;
+}
+
+std::vector<SceneBuffers> SceneBuffers::upload_pool(Device& device, std::span<const lsp_scene* const> scenes,
+                                                    uint32_t uses, bool staging, Buffer& pool) {
+  std::vector<SceneBuffers> results;
+  uint64_t bytes = 0;
+  for (size_t i = 0; i < scenes.size(); ++i) {
+    SceneBuffers result(device);
+    result.plan_ = make_plan(device, *scenes[i], uses);
+    lsp_error error;
+    const lsp_status status =
+        lsp_vulkan_place_buffers(&result.plan_, &device.limits, &bytes, result.places_, &error);
+    if (status != LSP_OK)
+      throw Failure(static_cast<Exit>(status), "", "asset " + std::to_string(i) + ": " + error.message);
+    result.bytes_uploaded_ = result.plan_.bytes;
+    results.push_back(std::move(result));
+  }
+  pool = Buffer(device, bytes, LSP_VULKAN_BUFFER_USAGE, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT,
+                staging ? 0 : kHostMemory);
+  for (size_t i = 0; i < scenes.size(); ++i) {
+    std::vector<Destination> to;
+    for (uint32_t k = 0; k < results[i].plan_.buffer_count; ++k) to.push_back({&pool, results[i].places_[k]});
+    upload_sections(device, *scenes[i], results[i].plan_, to, staging);
+  }
+  return results;
 }
 
 void SceneBuffers::write_addresses() {
@@ -182,29 +231,12 @@ void SceneBuffers::write_addresses() {
   for (uint32_t i = 0; i < plan_.buffer_count; ++i) {
     auto info = vk_make<VkBufferDeviceAddressInfo>(VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO);
     info.buffer = handles_[i];
-    buffer_addresses_[i] = device_->vk.vkGetBufferDeviceAddress(device_->handle, &info);
+    places_[i] = device_->vk.vkGetBufferDeviceAddress(device_->handle, &info);
   }
   VkDeviceAddress table[LSP_VULKAN_ADDRESS_COUNT];
-  lsp_vulkan_address_table(&plan_, buffer_addresses_, table);
+  lsp_vulkan_address_table(&plan_, places_, table);
   addresses_ = Buffer(*device_, sizeof table, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, kHostMemory, 0);
   memcpy(addresses_.mapped(), table, sizeof table);
-}
-
-void SceneBuffers::upload_mapped(const lsp_scene& scene) {
-  lsp_vulkan_copy piece;
-  for (uint64_t cursor = 0; lsp_vulkan_next_copy(&scene, &plan_, kPieceBytes, &cursor, &piece) != 0;) {
-    memcpy(static_cast<unsigned char*>(owned_[piece.buffer].mapped()) + piece.buffer_offset, piece.source,
-           piece.bytes);
-  }
-}
-
-void SceneBuffers::upload_staged(const lsp_scene& scene) {
-  Ring ring(*device_);
-  lsp_vulkan_copy piece;
-  for (uint64_t cursor = 0; lsp_vulkan_next_copy(&scene, &plan_, kPieceBytes, &cursor, &piece) != 0;) {
-    ring.copy(piece, handles_[piece.buffer]);
-  }
-  ring.finish();
 }
 
 }  // namespace lsp

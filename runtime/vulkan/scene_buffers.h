@@ -1,6 +1,8 @@
-// An open scene's sections as buffers of a device, by import of the mapping or by upload.
+// An open scene's sections as buffers of a device, by import of the mapping or by upload; or those of several
+// scenes in one buffer.
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -18,6 +20,11 @@ class SceneBuffers {
   // else straight into device memory that the host sees where there is such memory.
   static SceneBuffers upload(Device& device, const lsp_scene& scene, uint32_t uses, bool staging);
 
+  // Of every scene, each its own SceneBuffers without handles: the sections of all lie in `pool`. Throws
+  // Failure(kLimit), by the scene's number, where they are more than a storage buffer of the device may be.
+  static std::vector<SceneBuffers> upload_pool(Device& device, std::span<const lsp_scene* const> scenes,
+                                               uint32_t uses, bool staging, Buffer& pool);
+
   ~SceneBuffers();
   SceneBuffers(SceneBuffers&& other) noexcept;
   SceneBuffers& operator=(SceneBuffers&& other) = delete;
@@ -26,21 +33,19 @@ class SceneBuffers {
   const VkBuffer* handles() const { return handles_; }
   // The buffer with the sections' addresses; null where the plan does without.
   VkBuffer addresses() const { return addresses_.handle(); }
-  // Those of the buffers, in the plan's order; zero where the plan does without.
-  const VkDeviceAddress* buffer_addresses() const { return buffer_addresses_; }
+  // Addresses of the buffers, or their places in the pool, in the plan's order; zero where there is neither.
+  const VkDeviceAddress* places() const { return places_; }
   uint64_t bytes_imported() const { return bytes_imported_; }
   uint64_t bytes_uploaded() const { return bytes_uploaded_; }
 
  private:
   explicit SceneBuffers(Device& device) : device_(&device) {}
   void write_addresses();
-  void upload_mapped(const lsp_scene& scene);
-  void upload_staged(const lsp_scene& scene);
 
   Device* device_;
   lsp_vulkan_plan plan_{};
   VkBuffer handles_[LSP_VULKAN_MAX_BUFFERS]{};
-  VkDeviceAddress buffer_addresses_[LSP_VULKAN_MAX_BUFFERS]{};
+  VkDeviceAddress places_[LSP_VULKAN_MAX_BUFFERS]{};
   Buffer addresses_;
   std::vector<Buffer> owned_;                 // upload: the buffers behind the handles
   VkDeviceMemory imported_ = VK_NULL_HANDLE;  // import: the one memory behind all buffers

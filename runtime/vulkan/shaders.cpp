@@ -20,7 +20,7 @@ constexpr Spirv kShaders[4][2][2] = {{LSP_SPIRV(trace), LSP_SPIRV(trace_addresse
                                      {LSP_SPIRV(trace_ntree), LSP_SPIRV(trace_ntree_addresses)},
                                      {LSP_SPIRV(trace_cells), LSP_SPIRV(trace_cells_addresses)},
                                      {LSP_SPIRV(trace_wide), LSP_SPIRV(trace_wide_addresses)}};
-constexpr Spirv kInstances[2] = LSP_SPIRV(trace_instances);
+constexpr Spirv kInstances[2][2] = {LSP_SPIRV(trace_instances), LSP_SPIRV(trace_instances_addresses)};
 
 }  // namespace
 
@@ -31,8 +31,9 @@ extern "C" const uint32_t* lsp_vulkan_trace_spirv(const lsp_vulkan_plan* plan, i
   return shader.words;
 }
 
-extern "C" const uint32_t* lsp_vulkan_instances_spirv(int counting, size_t* bytes) {
-  const Spirv& shader = kInstances[counting != 0];
+extern "C" const uint32_t* lsp_vulkan_instances_spirv(const lsp_vulkan_kind* kind, int counting,
+                                                      size_t* bytes) {
+  const Spirv& shader = kInstances[kind->addresses != 0][counting != 0];
   *bytes = shader.bytes;
   return shader.words;
 }

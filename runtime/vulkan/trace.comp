@@ -3,7 +3,7 @@
 // LSP_NTREE, the base structure is an NTree; with LSP_CELLS, cells answer; with LSP_INSTANCES, instances of files.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#if defined(LSP_ADDRESSES) || defined(LSP_INSTANCES)
+#ifdef LSP_ADDRESSES
 #extension GL_EXT_buffer_reference : require
 #extension GL_EXT_buffer_reference_uvec2 : require
 #endif

@@ -53,10 +53,10 @@ class Pipelines {
   }
   // The same of instances, whose assets need these parts of the shader.
   VkPipeline get_instances(bool counting, const lsp_vulkan_kind& kind) {
-    VkPipeline& pipeline = made_[{kInstances, 1, counting, kind.flags, kind.parts}];
+    VkPipeline& pipeline = made_[{kInstances, kind.addresses, counting, kind.flags, kind.parts}];
     if (pipeline != VK_NULL_HANDLE) return pipeline;
     size_t bytes = 0;
-    const uint32_t* words = lsp_vulkan_instances_spirv(counting ? 1 : 0, &bytes);
+    const uint32_t* words = lsp_vulkan_instances_spirv(&kind, counting ? 1 : 0, &bytes);
     return pipeline = create(words, bytes, kind);
   }
 
@@ -121,6 +121,8 @@ class VulkanTracer::Impl {
   void unload() noexcept;
   void load_all(std::span<const lsp_scene* const> scenes, LoadPath path, bool numbered);
   void load_next(const lsp_scene& scene, LoadPath path);
+  void load_pool(std::span<const lsp_scene* const> scenes);
+  bool fits_pool(std::span<const lsp_scene* const> scenes) const;
   bool try_import(const lsp_scene& scene, bool forced);
   void attach(const lsp_scene& scene, SceneBuffers&& buffers, bool imported);
   void try_instances();
@@ -137,6 +139,7 @@ class VulkanTracer::Impl {
   std::unique_ptr<TraceShader> shader_;
   VkDescriptorSet set_ = VK_NULL_HANDLE;
   std::unique_ptr<Pipelines> pipelines_;
+  Buffer pool_;       // the sections of all assets; none where they are read through addresses
   Buffer assets_;     // an lsp_vulkan_asset for each that is loaded
   Buffer instances_;  // as lsp_instances_build has filled it
   VkDeviceSize instances_capacity_ = 0;
@@ -163,6 +166,7 @@ void VulkanTracer::Impl::unload() noexcept {
   pipelines_.reset();
   assets_ = {};
   loaded.clear();
+  pool_ = {};
 }
 
 // Refuses, by its number, an asset that the shader of instances cannot trace for every use.
@@ -252,6 +256,26 @@ void VulkanTracer::Impl::load_next(const lsp_scene& scene, LoadPath path) {
   attach(scene, SceneBuffers::upload(*device, scene, uses_, options_.discrete), false);
 }
 
+// Whether one storage buffer holds all assets. What else is wrong with one is said when it is loaded.
+bool VulkanTracer::Impl::fits_pool(std::span<const lsp_scene* const> scenes) const {
+  uint64_t bytes = 0;
+  for (const lsp_scene* scene : scenes) {
+    lsp_vulkan_plan plan;
+    VkDeviceAddress places[LSP_VULKAN_MAX_BUFFERS];
+    if (lsp_vulkan_plan_buffers(scene, uses_, &device->limits, &plan, nullptr) == LSP_OK &&
+        lsp_vulkan_place_buffers(&plan, &device->limits, &bytes, places, nullptr) != LSP_OK)
+      return false;
+  }
+  return true;
+}
+
+void VulkanTracer::Impl::load_pool(std::span<const lsp_scene* const> scenes) {
+  name_.clear();
+  std::vector<SceneBuffers> buffers =
+      SceneBuffers::upload_pool(*device, scenes, uses_, options_.discrete, pool_);
+  for (size_t i = 0; i < scenes.size(); ++i) attach(*scenes[i], std::move(buffers[i]), false);
+}
+
 void VulkanTracer::Impl::load_all(std::span<const lsp_scene* const> scenes, LoadPath path, bool numbered) {
   unload();
   if (numbered) check_assets(scenes);
@@ -259,7 +283,9 @@ void VulkanTracer::Impl::load_all(std::span<const lsp_scene* const> scenes, Load
   for (const lsp_scene* scene : scenes) stack = std::max(stack, scene->header->max_stack);
   pipelines_ = std::make_unique<Pipelines>(*device, *shader_, stack);
   loaded.reserve(scenes.size());
-  for (size_t i = 0; i < scenes.size(); ++i) {
+  const bool pooled = numbered && (uses_ & LSP_USE_ADDRESSES_ALWAYS) == 0;
+  if (pooled) load_pool(scenes);
+  for (size_t i = 0; i < scenes.size() && !pooled; ++i) {
     name_ = numbered ? "asset " + std::to_string(i) + ": " : "";
     try {
       load_next(*scenes[i], path);
@@ -276,12 +302,15 @@ void VulkanTracer::Impl::load_all(std::span<const lsp_scene* const> scenes, Load
 void VulkanTracer::Impl::load(std::span<const lsp_scene* const> scenes, uint32_t uses, LoadPath path,
                               bool numbered) {
   const auto start = std::chrono::steady_clock::now();
-  if (numbered && device->address_uses == 0)
-    throw Failure(Exit::kUnsupported, "",
-                  "instances need buffer addresses (bufferDeviceAddress), which the device lacks; trace them "
-                  "on the CPU");
   instanced_ = numbered;
-  uses_ = uses | (numbered ? LSP_USE_ADDRESSES_ALWAYS : device->address_uses);
+  uses_ = uses | (device->address_uses & (numbered ? LSP_USE_ADDRESSES_ALWAYS : ~0u));
+  // Only by addresses assets are read where they are, and as many bytes as there may be.
+  if (numbered && (path == LoadPath::kImport || (device->address_uses != 0 && !fits_pool(scenes))))
+    uses_ |= LSP_USE_ADDRESSES_ALWAYS;
+  if ((uses_ & LSP_USE_ADDRESSES_ALWAYS) != 0 && device->address_uses == 0)
+    throw Failure(Exit::kUnsupported, "",
+                  "assets can be imported only where they are read through buffer addresses "
+                  "(bufferDeviceAddress), which the device lacks; upload them");
   load_note.clear();
   try {
     load_all(scenes, path, numbered);
@@ -339,8 +368,8 @@ void VulkanTracer::Impl::put_instances(const lsp_instances& instances, const lsp
   for (size_t i = 0; i < loaded.size(); ++i) {
     const SceneBuffers& buffers = loaded[i].buffers;
     lsp_error error;
-    const lsp_status status = lsp_vulkan_describe_asset(
-        &loaded[i].scene, &buffers.plan(), buffers.buffer_addresses(), &options, &described[i], &error);
+    const lsp_status status = lsp_vulkan_describe_asset(&loaded[i].scene, &buffers.plan(), buffers.places(),
+                                                        &options, &described[i], &error);
     if (status != LSP_OK)
       throw Failure(static_cast<Exit>(status), "", "asset " + std::to_string(i) + ": " + error.message);
   }
@@ -380,8 +409,8 @@ VulkanTrace VulkanTracer::Impl::trace_instances(const lsp_instances& instances,
   batches_->reserve(rays.size());
   put_instances(instances, wanted);
   lsp_vulkan_write_instance_descriptors(&device->functions, device->handle, set_, assets_.handle(),
-                                        instances_.handle(), batches_->rays(), batches_->hits(),
-                                        batches_->counters());
+                                        instances_.handle(), pool_.handle(), batches_->rays(),
+                                        batches_->hits(), batches_->counters());
   const VkPipeline pipeline = pipelines_->get_instances(count, kind);
   const auto record = [&](VkCommandBuffer commands, uint32_t size) {
     const lsp_vulkan_instance_constants constants{instances.count, 0, size, mask};

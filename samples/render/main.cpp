@@ -292,10 +292,9 @@ int main(int argc, char** argv) {
   app.add_option("--exposure", a.exposure,
                  "Stops to brighten a .png by, or auto: what is too dark or too bright is brought into range "
                  "(default auto, with --camera 0)");
-  app.add_option(
-         "--backend", a.backend,
-         "Where rays are traced (default cpu); of a scene of instances vulkan needs buffer addresses, "
-         "and assets with cells or wide nodes")
+  app.add_option("--backend", a.backend,
+                 "Where rays are traced (default cpu); of a scene of instances vulkan needs assets "
+                 "with cells or wide nodes")
       ->check(CLI::IsMember({"cpu", "vulkan"}));
   app.add_option("--threads", a.options.threads, "Threads of the CPU (default: all)")
       ->check(CLI::Range(1, 1024));

@@ -24,29 +24,29 @@ DeviceScene::DeviceScene(Gpu& gpu, const RenderScene& scene)
     scenes_.push_back(scene.single());
   } else {
     scenes_.assign(instances_->assets, instances_->assets + instances_->asset_count);
-    if (!gpu.has_addresses)
-      throw Failure(Exit::kUnsupported, path_,
-                    "instances need buffer addresses (bufferDeviceAddress), which the device lacks; "
-                    "lsp-render shows them on the CPU");
   }
   plan(gpu.properties.limits);
   staging_ = GpuBuffer(gpu, kPiece, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, Memory::kHost);
-  for (size_t i = 0; i < scenes_.size(); ++i) sections_.push_back(upload_sections(*scenes_[i], plans_[i]));
-  if (instances_ != nullptr) upload_instances();
+  if (instances_ != nullptr)
+    upload_instances();
+  else
+    upload_single();
   upload_shading(scene);
   staging_ = GpuBuffer();
 }
 
 // [lsp] Which buffers the files need, for rays of both kinds. What cannot be traced is refused here.
 void DeviceScene::plan(const VkPhysicalDeviceLimits& device) {
-  const uint32_t addresses = instances_ != nullptr ? LSP_USE_ADDRESSES_ALWAYS : 0;
-  const uint32_t uses = LSP_USE_EXACT | LSP_USE_APPROXIMATE | addresses;
+  const uint32_t uses = LSP_USE_EXACT | LSP_USE_APPROXIMATE;
   const lsp_vulkan_limits limits{device.maxStorageBufferRange, 0, device.maxComputeWorkGroupCount[0], 0};
   lsp_error error;
   lsp_status status = lsp_vulkan_load_functions(gpu_.device, vkGetDeviceProcAddr, &functions_, &error);
   if (status != LSP_OK) throw Failure(static_cast<Exit>(status), path_, error.message);
   for (size_t i = 0; i < scenes_.size(); ++i) {
     status = lsp_vulkan_plan_buffers(scenes_[i], uses, &limits, &plans_.emplace_back(), &error);
+    if (status == LSP_OK && instances_ != nullptr)
+      status =
+          lsp_vulkan_place_buffers(&plans_[i], &limits, &pool_bytes_, places_.emplace_back().data(), &error);
     const std::string number = instances_ != nullptr ? "asset " + std::to_string(i) + ": " : "";
     if (status != LSP_OK) throw Failure(static_cast<Exit>(status), path_, number + error.message);
   }
@@ -65,27 +65,42 @@ lsp_vulkan_kind DeviceScene::kind(const lsp_trace_options& options) const {
   return kind;
 }
 
-// [lsp] The sections as they lie in the file, straight from the mapping.
-DeviceScene::Sections DeviceScene::upload_sections(const lsp_scene& scene, const lsp_vulkan_plan& plan) {
-  Sections sections;
-  for (uint32_t i = 0; i < plan.buffer_count; ++i) {
-    sections.buffers.emplace_back(gpu_, plan.buffers[i].bytes, plan.usage, Memory::kDevice);
-    sections.handles.push_back(sections.buffers.back().handle());
-  }
+// [lsp] The sections as they lie in the file, straight from the mapping. `destination` is told a piece, moves
+// its offset where it has to, and answers the buffer.
+template <class Destination>
+void DeviceScene::upload_sections(size_t number, const Destination& destination) {
   lsp_vulkan_copy piece;
-  for (uint64_t cursor = 0; lsp_vulkan_next_copy(&scene, &plan, kPiece, &cursor, &piece) != 0;) {
+  for (uint64_t cursor = 0;
+       lsp_vulkan_next_copy(scenes_[number], &plans_[number], kPiece, &cursor, &piece) != 0;) {
     std::memcpy(staging_.mapped(), piece.source, piece.bytes);
+    const VkBuffer buffer = destination(piece);
     gpu_.run([&](VkCommandBuffer commands) {
-      lsp_vulkan_record_copy(&functions_, commands, &piece, staging_.handle(), 0,
-                             sections.handles[piece.buffer]);
+      lsp_vulkan_record_copy(&functions_, commands, &piece, staging_.handle(), 0, buffer);
       lsp_vulkan_record_upload_barrier(&functions_, commands);
     });
   }
-  return sections;
 }
 
-// [lsp] The tree over instances as it was built, and room for what the shader reads of every asset.
+// [lsp] One file: a buffer for each of its sections.
+void DeviceScene::upload_single() {
+  const lsp_vulkan_plan& plan = plans_[0];
+  for (uint32_t i = 0; i < plan.buffer_count; ++i) {
+    sections_.emplace_back(gpu_, plan.buffers[i].bytes, plan.usage, Memory::kDevice);
+    handles_.push_back(sections_.back().handle());
+  }
+  upload_sections(0, [&](const lsp_vulkan_copy& piece) { return handles_[piece.buffer]; });
+}
+
+// [lsp] All assets in one buffer, the tree over instances as it was built, and room for what the shader reads
+// of every asset.
 void DeviceScene::upload_instances() {
+  sections_.emplace_back(gpu_, pool_bytes_, LSP_VULKAN_BUFFER_USAGE, Memory::kDevice);
+  for (size_t i = 0; i < scenes_.size(); ++i) {
+    upload_sections(i, [&](lsp_vulkan_copy& piece) {
+      piece.buffer_offset += places_[i][piece.buffer];
+      return sections_[0].handle();
+    });
+  }
   placed_ = upload(instances_->records, lsp_instances_bytes(instances_->count), "instances");
   assets_ = GpuBuffer(gpu_, scenes_.size() * sizeof(lsp_vulkan_asset), VK_BUFFER_USAGE_STORAGE_BUFFER_BIT,
                       Memory::kHost);
@@ -95,11 +110,9 @@ void DeviceScene::set_dial(const lsp_trace_options& options) {
   if (instances_ == nullptr) return;
   auto* const described = static_cast<lsp_vulkan_asset*>(assets_.mapped());
   for (size_t i = 0; i < scenes_.size(); ++i) {
-    std::vector<VkDeviceAddress> addresses;
-    for (const GpuBuffer& buffer : sections_[i].buffers) addresses.push_back(buffer.address());
     lsp_error error;
     const lsp_status status =
-        lsp_vulkan_describe_asset(scenes_[i], &plans_[i], addresses.data(), &options, &described[i], &error);
+        lsp_vulkan_describe_asset(scenes_[i], &plans_[i], places_[i].data(), &options, &described[i], &error);
     if (status != LSP_OK)
       throw Failure(static_cast<Exit>(status), path_, "asset " + std::to_string(i) + ": " + error.message);
   }
@@ -108,10 +121,10 @@ void DeviceScene::set_dial(const lsp_trace_options& options) {
 void DeviceScene::write_set(VkDescriptorSet set, VkBuffer unused) const {
   if (instances_ != nullptr)
     lsp_vulkan_write_instance_descriptors(&functions_, gpu_.device, set, assets_.handle(), placed_.handle(),
-                                          unused, unused, VK_NULL_HANDLE);
+                                          sections_[0].handle(), unused, unused, VK_NULL_HANDLE);
   else
-    lsp_vulkan_write_descriptors(&functions_, gpu_.device, set, plans_.data(), sections_[0].handles.data(),
-                                 unused, unused, VK_NULL_HANDLE);
+    lsp_vulkan_write_descriptors(&functions_, gpu_.device, set, plans_.data(), handles_.data(), unused,
+                                 unused, VK_NULL_HANDLE);
 }
 
 // Of all files one behind the other.

@@ -1,6 +1,8 @@
 // An .lsp file, or instances of several, on the device: [lsp] marks what an engine adds for the library.
 #pragma once
 
+#include <array>
+
 #include "gpu.h"
 #include "interface.h"
 #include "lsp/lsp_vulkan.h"
@@ -11,8 +13,8 @@ namespace lsp::sample {
 class DeviceScene {
  public:
   // Uploads the sections that exact and approximate rays need, and what shading needs beside them. Throws
-  // lsp::Failure: kUnsupported (instances: of what no shader traces, or on a device without buffer
-  // addresses), kLimit (a section is larger than the device's buffers may be).
+  // lsp::Failure: kUnsupported (instances: of what no shader traces), kLimit (a section, or all assets
+  // together, are larger than the device's buffers may be).
   DeviceScene(Gpu& gpu, const RenderScene& scene);
 
   // [lsp] What a pipeline for such rays is made of; of instances that of all assets, kInstancesShader.
@@ -32,13 +34,11 @@ class DeviceScene {
   uint32_t instance_count() const { return instances_ != nullptr ? instances_->count : 0; }
 
  private:
-  // A file's sections: buffers in the order of its plan.
-  struct Sections {
-    std::vector<GpuBuffer> buffers;
-    std::vector<VkBuffer> handles;
-  };
+  using Places = std::array<VkDeviceAddress, LSP_VULKAN_MAX_BUFFERS>;
   void plan(const VkPhysicalDeviceLimits& limits);
-  Sections upload_sections(const lsp_scene& scene, const lsp_vulkan_plan& plan);
+  template <class Destination>
+  void upload_sections(size_t number, const Destination& destination);
+  void upload_single();
   void upload_shading(const RenderScene& scene);
   void upload_instances();
   template <class T>
@@ -50,7 +50,10 @@ class DeviceScene {
   const lsp_instances* instances_;  // null: there is one file
   std::vector<const lsp_scene*> scenes_;
   std::vector<lsp_vulkan_plan> plans_;  // of each
-  std::vector<Sections> sections_;      // of each
+  std::vector<Places> places_;          // of each in the buffer of all, of instances alone
+  uint64_t pool_bytes_ = 0;             // that buffer's
+  std::vector<GpuBuffer> sections_;     // in the order of the plan; of instances the buffer of all
+  std::vector<VkBuffer> handles_;       // of these
   lsp_vulkan_functions functions_{};
   GpuBuffer staging_;
   GpuBuffer assets_;  // an lsp_vulkan_asset each

@@ -78,7 +78,7 @@ void Gpu::create_instance(bool validation) {
 
   auto application = vk_make<VkApplicationInfo>(VK_STRUCTURE_TYPE_APPLICATION_INFO);
   application.pApplicationName = "lsp-view";
-  application.apiVersion = VK_API_VERSION_1_2;  // of which buffer addresses are used, where there are any
+  application.apiVersion = VK_API_VERSION_1_1;
   const VkValidationFeatureEnableEXT enabled = VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT;
   auto features = vk_make<VkValidationFeaturesEXT>(VK_STRUCTURE_TYPE_VALIDATION_FEATURES_EXT);
   features.enabledValidationFeatureCount = 1;
@@ -159,19 +159,9 @@ void Gpu::create_device() {
   VkPhysicalDeviceFeatures features{};
   features.robustBufferAccess = available.robustBufferAccess;
   const char* swapchain = VK_KHR_SWAPCHAIN_EXTENSION_NAME;
-  auto addresses = vk_make<VkPhysicalDeviceBufferDeviceAddressFeatures>(
-      VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_BUFFER_DEVICE_ADDRESS_FEATURES);
-  if (properties.apiVersion >= VK_API_VERSION_1_2) {
-    auto all = vk_make<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2);
-    all.pNext = &addresses;
-    vkGetPhysicalDeviceFeatures2(physical, &all);
-    has_addresses = addresses.bufferDeviceAddress == VK_TRUE;
-    addresses.bufferDeviceAddressCaptureReplay = addresses.bufferDeviceAddressMultiDevice = VK_FALSE;
-  }
   auto info = vk_make<VkDeviceCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO);
   info.queueCreateInfoCount = 1;
   info.pQueueCreateInfos = &queue_info;
-  if (has_addresses) info.pNext = &addresses;
   info.enabledExtensionCount = 1;
   info.ppEnabledExtensionNames = &swapchain;
   info.pEnabledFeatures = &features;
@@ -232,9 +222,6 @@ GpuBuffer::GpuBuffer(Gpu& gpu, VkDeviceSize bytes, VkBufferUsageFlags usage, Mem
                                                                          VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
     auto allocation = vk_make<VkMemoryAllocateInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO);
     allocation.allocationSize = needs.size;
-    auto flags = vk_make<VkMemoryAllocateFlagsInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO);
-    flags.flags = VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT;
-    if ((usage & VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT) != 0) allocation.pNext = &flags;
     allocation.memoryTypeIndex =
         static_cast<uint32_t>(std::max(gpu.memory_type(needs.memoryTypeBits, wanted), 0));
     vk_check(vkAllocateMemory(gpu.device, &allocation, nullptr, &memory_), "vkAllocateMemory");
@@ -259,12 +246,6 @@ GpuBuffer& GpuBuffer::operator=(GpuBuffer&& other) noexcept {
   std::swap(memory_, other.memory_);
   std::swap(mapped_, other.mapped_);
   return *this;
-}
-
-VkDeviceAddress GpuBuffer::address() const {
-  auto info = vk_make<VkBufferDeviceAddressInfo>(VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO);
-  info.buffer = buffer_;
-  return vkGetBufferDeviceAddress(gpu_->device, &info);
 }
 
 void record_barrier(VkCommandBuffer commands, VkPipelineStageFlags from, VkAccessFlags written,

@@ -41,7 +41,6 @@ class Gpu {
   uint32_t family = 0;
   VkQueue queue = VK_NULL_HANDLE;
   double seconds_per_tick = 0;        // of time stamps; 0: the queue has none
-  bool has_addresses = false;         // of buffers, for shaders
   std::vector<std::string> messages;  // of the validation layer; empty is clean
 
  private:
@@ -69,8 +68,6 @@ class GpuBuffer {
 
   VkBuffer handle() const { return buffer_; }
   void* mapped() const { return mapped_; }
-  // Of one whose usage has VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT.
-  VkDeviceAddress address() const;
 
  private:
   Gpu* gpu_ = nullptr;

@@ -2,8 +2,6 @@
 // it writes hits.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_buffer_reference : require
-#extension GL_EXT_buffer_reference_uvec2 : require
 #include "lsp/lsp.glsl"
 
 layout(local_size_x = LSP_VULKAN_GROUP_SIZE) in;

@@ -11,12 +11,12 @@
 
 #include "bake.h"
 #include "hard_rays.h"
+#include "instance_shaders.h"
 #include "lsp/instances.hpp"
 #include "lsp/program.h"
 #include "lsp/scene_file.hpp"
 #include "lsp/vulkan_device.hpp"
 #include "meshes.h"
-#include "offset_shader.h"
 #include "writer.h"
 
 // Vulkan drivers and the loader leave memory behind.
@@ -38,7 +38,7 @@ std::unique_ptr<SceneFile> bake_file(const Mesh& mesh, uint32_t cells) {
   const std::string path =
       (fs::temp_directory_path() / ("lsp_test_instance_shader_" + std::to_string(getpid()) + ".lsp"))
           .string();
-  write_lsp(path, baked, "{}", {});
+  write_lsp(path, baked, "{}", {.alignment = 4096});  // or it cannot be imported
   auto file = std::make_unique<SceneFile>(path);
   fs::remove(path);
   return file;
@@ -156,6 +156,26 @@ TEST_F(InstanceShader, EveryKindOfRay) {
   expect_same_bits(tracer, instances, {kApproximate, 0});
 }
 
+// Each asset in buffers of its own, by their addresses: where that is asked for, and of imported files.
+TEST_F(InstanceShader, ThroughAddresses) {
+  const std::vector<const lsp_scene*> scenes = {&assets().ball->scene(), &assets().soup->scene()};
+  const Instances instances(scenes, places_of(2, 40, 37));
+  VulkanOptions options;
+  options.addresses = true;
+  VulkanTracer tracer(options);
+  for (const LoadPath path : {LoadPath::kUpload, LoadPath::kImport}) {
+    try {
+      tracer.load(scenes, LSP_USE_EXACT | LSP_USE_APPROXIMATE, path);
+    } catch (const Failure& failure) {
+      ASSERT_EQ(path, LoadPath::kImport) << failure.what();
+      std::cout << "not imported: " << failure.what() << "\n";
+      continue;
+    }
+    EXPECT_EQ(tracer.load_path(), path);
+    for (const uint32_t flags : {0u, kApproximate}) expect_same_bits(tracer, instances, {flags, 0});
+  }
+}
+
 // Where no asset has tables approximate rays are exact, and what is loaded for them will do for both; where
 // one has nothing but tables all rays are approximate.
 TEST_F(InstanceShader, OneKindOfAsset) {
@@ -176,7 +196,7 @@ TEST_F(InstanceShader, OneKindOfAsset) {
 }
 
 // Where tables alone are loaded their dial is that of tables alone, whatever is asked for: what cells need
-// besides is at address 0.
+// besides is not there.
 TEST_F(InstanceShader, TablesAlone) {
   const std::vector<const lsp_scene*> scenes = {&assets().ball->scene(), &assets().sheet->scene()};
   const Instances instances(scenes, places_of(2, 30, 47));
@@ -192,6 +212,33 @@ TEST_F(InstanceShader, TablesAlone) {
   } catch (const Failure& failure) {
     EXPECT_EQ(failure.exit(), Exit::kUnsupported);
     EXPECT_STREQ(failure.what(), "asset 0: is not loaded for exact rays; load it for LSP_USE_EXACT");
+  }
+}
+
+// Several scenes in one dispatch that nothing places: each ray has the bits of lsp_trace of its own scene.
+TEST_F(InstanceShader, AssetsAlone) {
+  const std::vector<const lsp_scene*> scenes = {&assets().ball->scene(), &assets().soup->scene(),
+                                                &assets().sheet->scene()};
+  for (const uint32_t flags : {0u, kApproximate}) {
+    const lsp_trace_options options{flags, 0, LSP_QUALITY_FAST, 0};
+    std::vector<LspHit> hits;
+    try {
+      hits = hits_in_assets(scenes, options, rays_);
+    } catch (const Failure& failure) {
+      if (failure.exit() != Exit::kUnsupported) throw;
+      GTEST_SKIP() << failure.what();
+    }
+    size_t of_tables = 0, of_triangles = 0;
+    for (size_t i = 0; i < rays_.size() && !HasFailure(); ++i) {
+      LspHit expected;
+      ASSERT_EQ(lsp_trace(scenes[i % scenes.size()], &options, &rays_[i], &expected, 1, nullptr, nullptr),
+                LSP_OK);
+      EXPECT_EQ(memcmp(&hits[i], &expected, sizeof(LspHit)), 0) << i;
+      if (expected.primitive != LSP_NONE)
+        ++((expected.flags & LSP_HIT_LINE_SPACE) != 0 ? of_tables : of_triangles);
+    }
+    EXPECT_GT(flags == kApproximate ? of_tables : of_triangles, 50u);
+    EXPECT_EQ(of_tables > 0, flags == kApproximate);
   }
 }
 
@@ -280,6 +327,39 @@ TEST_F(InstanceShader, AssetsAreLoadedOnce) {
   EXPECT_EQ(hit.primitive, LSP_NONE);
   const Instances others({&ball}, places_of(1, 1, 3));
   EXPECT_THROW(tracer.trace_instances(others.view(), {}, 0xFF, {&ray, 1}, {&hit, 1}), Failure);
+}
+
+// Assets lie in the pool one behind the other, as far as a storage buffer goes; all are read in one way.
+TEST(InstancePlan, PlacesAndTheirLimit) {
+  const std::vector<const lsp_scene*> scenes = {&assets().ball->scene(), &assets().soup->scene()};
+  lsp_vulkan_limits limits{1u << 27, 0, 65535, 0};
+  lsp_error error;
+  std::vector<lsp_vulkan_plan> plans(2);
+  VkDeviceAddress places[2][LSP_VULKAN_MAX_BUFFERS];
+  uint64_t bytes = 0, end = 0;
+  for (size_t i = 0; i < 2; ++i) {
+    ASSERT_EQ(lsp_vulkan_plan_buffers(scenes[i], LSP_USE_EXACT, &limits, &plans[i], &error), LSP_OK);
+    ASSERT_EQ(lsp_vulkan_place_buffers(&plans[i], &limits, &bytes, places[i], &error), LSP_OK);
+    for (uint32_t k = 0; k < plans[i].buffer_count; ++k) {
+      EXPECT_EQ(places[i][k] % 256, 0u);
+      EXPECT_GE(places[i][k], end);
+      end = places[i][k] + plans[i].buffers[k].bytes;
+    }
+    EXPECT_EQ(bytes, end);
+  }
+  limits.max_storage_buffer_range = bytes - 1;
+  uint64_t first = places[1][0];
+  EXPECT_EQ(lsp_vulkan_place_buffers(&plans[1], &limits, &first, places[1], &error), LSP_ERROR_LIMIT);
+  EXPECT_EQ(first, places[1][0]);
+  EXPECT_NE(std::string(error.message).find("maxStorageBufferRange"), std::string::npos) << error.message;
+
+  const uint32_t by_addresses = LSP_USE_EXACT | LSP_USE_ADDRESSES_ALWAYS;
+  ASSERT_EQ(lsp_vulkan_plan_buffers(scenes[1], by_addresses, &limits, &plans[1], &error), LSP_OK);
+  const lsp_trace_options exact{};
+  lsp_vulkan_kind kind;
+  EXPECT_EQ(lsp_vulkan_plan_instances(scenes.data(), plans.data(), 2, &exact, &kind, &error),
+            LSP_ERROR_UNSUPPORTED);
+  EXPECT_EQ(std::string(error.message).rfind("asset 1 is planned with addresses", 0), 0u) << error.message;
 }
 
 TEST_F(InstanceShader, ValidationHasNothingToSay) {

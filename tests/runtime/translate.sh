@@ -2,8 +2,8 @@
 # translate.sh SOURCE_DIR WORK_DIR GLSLC
 #
 # The shader include in other languages: what reads a scene over descriptors becomes HLSL for shader model 6.0, which
-# compiles (by glslc, which knows the language), and Metal's, through SPIRV-Cross; instances become Metal's. Exit 77: that
-# is not here.
+# compiles (by glslc, which knows the language), and Metal's, through SPIRV-Cross; what reads through addresses becomes
+# Metal's. Exit 77: that is not here.
 set -euo pipefail
 source=$1 work=$2 glslc=$3
 if ! command -v spirv-cross >/dev/null; then
@@ -28,19 +28,18 @@ translate bvh "$source/runtime/vulkan/trace.comp"
 translate ntree "$source/runtime/vulkan/trace.comp" -DLSP_NTREE
 translate cells "$source/runtime/vulkan/trace.comp" -DLSP_CELLS
 translate wide "$source/runtime/vulkan/trace.comp" -DLSP_WIDE
+translate instances "$source/runtime/vulkan/trace.comp" -DLSP_INSTANCES
 
-# Instances are read through addresses, which HLSL of SPIRV-Cross does not know.
-"$glslc" -O --target-env=vulkan1.2 "${includes[@]}" -DLSP_INSTANCES -o instances.spv "$source/runtime/vulkan/trace.comp"
+# Addresses HLSL of SPIRV-Cross does not know.
+"$glslc" -O --target-env=vulkan1.2 "${includes[@]}" -DLSP_INSTANCES -DLSP_ADDRESSES -o instances.spv "$source/runtime/vulkan/trace.comp"
 spirv-cross instances.spv --msl --msl-version 20300 --output instances.metal
 grep -q '^kernel void main0(' instances.metal
-echo "instances: Metal $(wc -l <instances.metal) lines"
+echo "instances through addresses: Metal $(wc -l <instances.metal) lines"
 
 # Several scenes in one pipeline, by their numbers.
 cat >several.comp <<'SHADER'
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_buffer_reference : require
-#extension GL_EXT_buffer_reference_uvec2 : require
 #define LSP_INSTANCES
 #include "lsp/lsp.glsl"
 layout(local_size_x = 64) in;
@@ -53,7 +52,7 @@ void main() {
   work[2u * i].w = lsp_occluded(scene, ray, LSP_TRACE_APPROXIMATE) ? hit.t + lsp_hit_offset(scene, hit) : 0.0;
 }
 SHADER
-"$glslc" -O -g --target-env=vulkan1.2 "${includes[@]}" -o several.spv several.comp
+"$glslc" -O -g --target-env=vulkan1.1 "${includes[@]}" -o several.spv several.comp
 # The buffer of instances is not read.
 spirv-cross several.spv --reflect | grep -q '"LspInstanceBuffer"' && { echo "several scenes read instances"; exit 1; }
 echo "several scenes in one shader"

@@ -78,14 +78,12 @@ LSP_STEP uint lsp_next_instance(LspInstances instances, LspInstanceRay r, uint m
   bool going = top > 0u;
   if (!going) lsp_instance_ref[0] = LSP_NONE;
   while (going) {
+    /* One after the other, not one of three: a device that runs all of them anyhow goes round less often. */
     if (ref == LSP_NONE) {
       --top;
       ref = lsp_instance_t[top] <= last ? lsp_instance_ref[top] : LSP_NONE;
-    } else if ((ref & LSP_INSTANCE_BIT) != 0u) {
-      uint number = ref & ~LSP_INSTANCE_BIT;
-      found = (lsp_load_instance_mask(instances, number) & mask & 0xFFu) != 0u ? number : LSP_NONE;
-      ref = LSP_NONE;
-    } else {
+    }
+    if ((ref & LSP_INSTANCE_BIT) == 0u) {
       LspInstanceNode node_0 = lsp_load_instance_node(instances, ref);
       LspInstanceNode node_1 = lsp_load_instance_node(instances, ref + 1u);
       float t_0 = lsp_instance_entry(r, node_0);
@@ -99,6 +97,11 @@ LSP_STEP uint lsp_next_instance(LspInstances instances, LspInstanceRay r, uint m
         ++top;
       }
       ++visited;
+    }
+    if ((ref & LSP_INSTANCE_BIT) != 0u && ref != LSP_NONE) {
+      uint number = ref & ~LSP_INSTANCE_BIT;
+      found = (lsp_load_instance_mask(instances, number) & mask & 0xFFu) != 0u ? number : LSP_NONE;
+      ref = LSP_NONE;
     }
     going = found == LSP_NONE && (ref != LSP_NONE || top > 0u);
     if (!going && found == LSP_NONE) lsp_instance_ref[0] = LSP_NONE;

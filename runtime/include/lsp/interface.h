@@ -88,9 +88,10 @@ LSP_END(LspHit)
 #define LSP_BINDING_FILLED_CELLS 9
 #define LSP_BINDING_PLANE_RECORDS 10
 #define LSP_BINDING_CELL_NODES 11
-/* Through instances there are two in place of these. */
+/* Through instances there are these in their place. */
 #define LSP_BINDING_ASSETS 0    /* lsp_vulkan_asset, read */
 #define LSP_BINDING_INSTANCES 1 /* the memory of lsp_instances_build, read */
+#define LSP_BINDING_POOL 2      /* and 3 and 4, one buffer: the assets' sections, read; not with addresses */
 #define LSP_BINDING_RAYS 12     /* LspRay, read */
 #define LSP_BINDING_HITS 13     /* LspHit, written */
 #define LSP_BINDING_COUNTERS 14 /* lsp_trace_counts, added to; only the counting shader uses it */

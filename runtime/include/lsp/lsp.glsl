@@ -59,7 +59,6 @@ layout(constant_id = LSP_PARTS_CONSTANT_ID) const uint lsp_parts = 0xFFFFFFFFu;
 #endif
 
 #ifdef LSP_INSTANCES
-#define LSP_ADDRESSES
 #define LSP_CELLS
 #define LSP_WIDE
 #else

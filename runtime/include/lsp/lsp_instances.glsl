@@ -1,9 +1,7 @@
 /* Of lsp.glsl with LSP_INSTANCES defined: traces rays through instances (lsp/lsp_instances.h), the tree over them and
  * the assets in one shader, with the bits of lsp_trace_instances. Assets are any mixture of what bakes make by default:
- * cells, whose exact rays walk wide nodes, and wide nodes alone. The including shader needs
+ * cells, whose exact rays walk wide nodes, and wide nodes alone.
  *
- *   #extension GL_EXT_buffer_reference : require
- *   #extension GL_EXT_buffer_reference_uvec2 : require
  *   #define LSP_INSTANCES
  *   #include "lsp/lsp.glsl"
  *
@@ -14,9 +12,10 @@
  *
  *   LspHit hit = lsp_trace(lsp_asset(number), ray, LSP_TRACE_APPROXIMATE);
  *
- * `count` is that of the instances, 0 allowed. Bindings, both read-only storage buffers:
+ * `count` is that of the instances, 0 allowed. Bindings, all read-only storage buffers:
  *   +0 the assets, an lsp_vulkan_asset each, in the order in which instances number them
  *   +1 the memory that lsp_instances_build has filled, as it is
+ *   +2 +3 +4 the pool, one buffer with the sections of all assets; with LSP_ADDRESSES none, see lsp_sections.glsl
  * LSP_SET, LSP_FIRST_BINDING, the stack and the parts are those of lsp.glsl, of all assets together: the largest stack,
  * every part that any of them needs. Flags that are a constant leave out what they do not need.
  */
@@ -95,31 +94,29 @@ LspPlace lsp_load_place(uint i) {
   return LspPlace(a.xyz, vec3(a.w, b.xy), vec3(b.zw, c.x), c.yzw, d.xyz);
 }
 
-LspScene lsp_asset(uint number) { return LspScene(lsp_assets[number].sections, number); }
+LspScene lsp_asset(uint number) { return LspScene(lsp_assets[number].sections, number, lsp_assets[number].header); }
 LspScene lsp_asset_of(uint instance) { return lsp_asset(lsp_instance_words[10u * instance].x); }
 
-/* Traces a ray in an asset's own space. What both texts do alike is done once: that halves what a device compiles. */
-LspTraced lsp_trace_asset(LspScene scene, LspRay ray, uint flags) {
-  LspSetup s = lsp_setup(scene, ray);
-  if (!s.valid) return lsp_invalid_ray();
+/* Whether the asset's cells answer; else its wide nodes do. */
+bool lsp_asks_cells(LspScene scene, uint flags) {
+  return (flags & LSP_TRACE_APPROXIMATE) != 0u && LSP_HEADER(scene).base_structure == LSP_BASE_CELLS;
+}
+
+/* Takes a valid ray in an asset's own space to its end. */
+LspWalked lsp_walk_asset(LspScene scene, LspSetup s, uint flags) {
   LspQuery q = lsp_query(flags, 0.0f, lsp_assets[scene.asset].dial);
-  bool cells = (flags & LSP_TRACE_APPROXIMATE) != 0u && LSP_HEADER(scene).base_structure == LSP_BASE_CELLS;
-  LspWalked walked;
-  if (cells) {
-    walked = lsp_walk_ready(scene, s, q);
-  } else {
-    q.flags &= ~LSP_TRACE_APPROXIMATE;
-    walked = lsp_wide_walk_ready(scene, s, q);
-  }
-  LspTraced traced;
-  traced.hit = lsp_finish_as(scene, s, ray, walked.best, q.flags, cells);
-  traced.counts = walked.counts;
-  traced.valid = true;
-  return traced;
+  if (lsp_asks_cells(scene, flags)) return lsp_walk_ready(scene, s, q);
+  q.flags &= ~LSP_TRACE_APPROXIMATE;
+  return lsp_wide_walk_ready(scene, s, q);
 }
 
 /* A ray in one asset's own space, without instances: the hit is that of lsp_trace with the asset's dial. */
-LspHit lsp_trace(LspScene scene, LspRay ray, uint flags) { return lsp_trace_asset(scene, ray, flags).hit; }
+LspHit lsp_trace(LspScene scene, LspRay ray, uint flags) {
+  LspSetup s = lsp_setup(scene, ray);
+  if (!s.valid) return lsp_no_hit();
+  LspBest best = lsp_walk_asset(scene, s, flags).best;
+  return lsp_finish_as(scene, s, ray, best, flags, lsp_asks_cells(scene, flags));
+}
 bool lsp_occluded(LspScene scene, LspRay ray, uint flags) {
   return lsp_trace(scene, ray, flags | LSP_TRACE_OCCLUSION).t < LSP_INFINITY;
 }
@@ -127,6 +124,30 @@ bool lsp_occluded(LspScene scene, LspRay ray, uint flags) {
 LspCounts lsp_add_counts(LspCounts a, LspCounts b) {
   return LspCounts(a.nodes + b.nodes, a.shafts + b.shafts, a.triangles + b.triangles, a.splits + b.splits,
                    a.exact + b.exact, a.exact_nodes + b.exact_nodes);
+}
+
+/* What a ray has met on its way through instances. */
+struct LspNearest {
+  uint instance; /* LSP_NONE: nothing */
+  float t;       /* as given */
+  LspBest best;  /* in the asset */
+  uint flags;    /* LSP_HIT_INCOMPLETE where a walk was cut short */
+  LspCounts counts;
+};
+
+/* What the nearest is, which is looked up once, not in every asset. */
+LspHit lsp_finish_instance(LspRay ray, LspNearest nearest, uint flags) {
+  LspHit hit = lsp_no_hit();
+  if (nearest.instance != LSP_NONE) {
+    LspScene scene = lsp_asset_of(nearest.instance);
+    LspPlace place = lsp_load_place(nearest.instance);
+    LspRay moved = lsp_move_ray(place, ray);
+    hit = lsp_finish_as(scene, lsp_setup(scene, moved), moved, nearest.best, flags, lsp_asks_cells(scene, flags));
+    hit.flags |= nearest.instance << LSP_HIT_INSTANCE_SHIFT;
+    if ((flags & LSP_TRACE_OCCLUSION) == 0u) hit.normal = lsp_move_normal(place, hit.normal);
+  }
+  hit.flags |= nearest.flags;
+  return hit;
 }
 
 /* As lsp_trace_instances below, with the work done; nodes are those of both kinds of trees. */
@@ -137,37 +158,41 @@ LspTraced lsp_trace_ray_instances(uint count, LspRay ray, uint mask, uint flags)
   LspInstances instances = LspInstances(count);
   bool any_hit = (LSP_TRACE_IMPLIED(flags) & LSP_TRACE_ANY_HIT) != 0u;
   LspInstanceRay r = lsp_begin_instances(instances, ray);
-  LspHit hit = traced.hit;
-  LspCounts counts = traced.counts;
-  uint nearest = LSP_NONE; /* the instance that is hit */
+  LspNearest nearest;
+  nearest.instance = LSP_NONE;
+  nearest.t = ray.tmax;
+  nearest.flags = 0u;
+  nearest.counts = lsp_no_counts();
   bool going = true;
   while (going) {
-    uint number = lsp_next_instance(instances, r, mask, nearest != LSP_NONE ? hit.t : ray.tmax);
+    uint number = lsp_next_instance(instances, r, mask, nearest.t);
     going = number != LSP_NONE;
     if (going) {
+      LspScene scene = lsp_asset_of(number);
       LspRay moved = lsp_move_ray(lsp_load_place(number), ray);
       /* Of hits at one t the lowest instance is the answer. */
-      if (nearest != LSP_NONE) moved.tmax = number < nearest ? lsp_step_up(hit.t) : hit.t;
-      LspTraced found = lsp_trace_asset(lsp_asset_of(number), moved, flags);
-      counts = lsp_add_counts(counts, found.counts);
-      uint incomplete = (hit.flags | found.hit.flags) & LSP_HIT_INCOMPLETE;
-      if (found.hit.t < LSP_INFINITY) {
-        hit = found.hit;
-        nearest = number;
-        going = !any_hit;
-        if (any_hit) lsp_instance_ref[0] = LSP_NONE;
+      moved.tmax = number < nearest.instance && nearest.instance != LSP_NONE ? lsp_step_up(nearest.t) : nearest.t;
+      LspSetup s = lsp_setup(scene, moved);
+      if (s.valid) {
+        LspWalked walked = lsp_walk_asset(scene, s, flags);
+        nearest.counts = lsp_add_counts(nearest.counts, walked.counts);
+        if (!walked.best.complete) nearest.flags = LSP_HIT_INCOMPLETE;
+        float t = walked.best.t * s.to_given;
+        if (walked.best.triangle != LSP_NONE && t > moved.tmin && t < moved.tmax) {
+          nearest.instance = number;
+          nearest.t = t;
+          nearest.best = walked.best;
+          going = !any_hit;
+          if (any_hit) lsp_instance_ref[0] = LSP_NONE;
+        }
       }
-      hit.flags |= incomplete;
     }
   }
-  counts.nodes += lsp_instance_visited;
-  if (lsp_instance_ref[0] != LSP_NONE) hit.flags |= LSP_HIT_INCOMPLETE;
-  if (nearest != LSP_NONE) {
-    hit.flags |= nearest << LSP_HIT_INSTANCE_SHIFT;
-    if ((flags & LSP_TRACE_OCCLUSION) == 0u) hit.normal = lsp_move_normal(lsp_load_place(nearest), hit.normal);
-  }
-  traced.hit = hit;
-  traced.counts = counts;
+  if (lsp_instance_ref[0] != LSP_NONE) nearest.flags = LSP_HIT_INCOMPLETE;
+  traced.counts = nearest.counts;
+  traced.counts.nodes += lsp_instance_visited;
+  nearest.best.complete = true;
+  traced.hit = lsp_finish_instance(ray, nearest, flags);
   return traced;
 }
 

@@ -45,7 +45,7 @@ extern "C" {
 /* And whether sections may be read through buffer device addresses instead of descriptors, where the device's
  * bufferDeviceAddress feature is on. */
 #define LSP_USE_ADDRESSES_IF_NEEDED 0x100u /* where one is larger than max_storage_buffer_range */
-#define LSP_USE_ADDRESSES_ALWAYS 0x200u    /* for tests: descriptors are faster */
+#define LSP_USE_ADDRESSES_ALWAYS 0x200u    /* descriptors are faster; for some assets of instances, below */
 
 /* The header's, and one a section that binds. */
 enum {
@@ -192,6 +192,7 @@ typedef struct lsp_vulkan_kind {
   uint32_t flags;          /* LSP_TRACE_*, those that make a difference */
   uint32_t parts;          /* LSP_PART_*; several scenes may share all that any of them needs */
   uint32_t dial;           /* lsp_vulkan_trace_constants.dial */
+  uint32_t addresses;      /* nonzero: the shader reads sections through addresses, as of a plan */
 } lsp_vulkan_kind;
 
 /* What kind of trace `options` ask for of the scene with the plan's buffers. What these do not hold is not
@@ -243,15 +244,29 @@ LSP_API void lsp_vulkan_record_trace(const lsp_vulkan_functions* functions, VkCo
 /* ---- instances ------------------------------------------------------------------------------------------
  *
  * One shader walks the tree over instances (lsp/lsp_instances.h) and traces their assets, any mixture of
- * cells and of wide nodes alone, through buffer device addresses: the device's bufferDeviceAddress feature
- * must be on, and every asset be planned with LSP_USE_ADDRESSES_ALWAYS. It reads two buffers: an
- * lsp_vulkan_asset for every asset, and the memory of lsp_instances_build, as it is, again whenever instances
+ * cells and of wide nodes alone. It reads three buffers: the pool, which holds the sections of all assets; an
+ * lsp_vulkan_asset for every asset; and the memory of lsp_instances_build, as it is, again whenever instances
  * have moved. An engine's own shader includes lsp.glsl with LSP_INSTANCES defined; the ready one is here.
+ *
+ * Assets that are together larger than a storage buffer may be, or whose files are imported, are read through
+ * buffer device addresses instead: every asset is planned with LSP_USE_ADDRESSES_ALWAYS, the device's
+ * bufferDeviceAddress feature is on, the shader has LSP_ADDRESSES defined, and there is no pool. That is
+ * slower on lavapipe.
  */
+
+/* Places an asset's buffers in the pool, behind those that are there: buffer i of the plan at byte places[i],
+ * a multiple of 256. *pool_bytes is the pool's size so far, 0 at first, and then with this asset. The pool is
+ * one buffer of the plan's usage; a piece of the upload goes to offset places[copy.buffer] +
+ * copy.buffer_offset. LSP_ERROR_LIMIT, and *pool_bytes as it was: the pool would be larger than the device's
+ * storage buffers may be. */
+LSP_API lsp_status lsp_vulkan_place_buffers(const lsp_vulkan_plan* plan, const lsp_vulkan_limits* limits,
+                                            uint64_t* pool_bytes,
+                                            VkDeviceAddress places[LSP_VULKAN_MAX_BUFFERS], lsp_error* error);
 
 /* What the shader reads of an asset: 480 bytes of a storage buffer. */
 typedef struct lsp_vulkan_asset {
-  VkDeviceAddress sections[LSP_VULKAN_ADDRESS_COUNT]; /* as of lsp_vulkan_address_table */
+  VkDeviceAddress sections[LSP_VULKAN_ADDRESS_COUNT]; /* as of lsp_vulkan_address_table; in the pool a
+                                                         sixteenth of the place */
   uint32_t dial;     /* of the asset: how approximate rays are answered there */
   uint32_t reserved; /* zero */
   LspHeader header;  /* the asset's */
@@ -262,27 +277,30 @@ typedef struct lsp_vulkan_asset {
  * base_structure and dial are 0: there is one shader, and each asset's dial is in its lsp_vulkan_asset.
  * LSP_ERROR_UNSUPPORTED, by the asset's number, as lsp_vulkan_plan_trace and where the shader cannot answer
  * such rays of a file, which has a BVH or an NTree, or cells and for exact rays a BVH (files before 2.3); or
- * where a plan is without addresses. */
+ * where some plans are with addresses and others are not. */
 LSP_API lsp_status lsp_vulkan_plan_instances(const lsp_scene* const* assets, const lsp_vulkan_plan* plans,
                                              uint32_t asset_count, const lsp_trace_options* options,
                                              lsp_vulkan_kind* kind, lsp_error* error);
 
-/* Fills *asset for a scene planned with addresses; `buffer_addresses` are those of the plan's buffers in its
- * order. Of `options` the dial is taken. Errors are those of lsp_vulkan_plan_instances. */
+/* Fills *asset for a scene; `places` are those of lsp_vulkan_place_buffers, of one planned with addresses the
+ * addresses of the plan's buffers in its order. Of `options` the dial is taken. Errors are those of
+ * lsp_vulkan_plan_instances. */
 LSP_API lsp_status lsp_vulkan_describe_asset(const lsp_scene* scene, const lsp_vulkan_plan* plan,
-                                             const VkDeviceAddress* buffer_addresses,
-                                             const lsp_trace_options* options, lsp_vulkan_asset* asset,
-                                             lsp_error* error);
+                                             const VkDeviceAddress* places, const lsp_trace_options* options,
+                                             lsp_vulkan_asset* asset, lsp_error* error);
 
-/* SPIR-V (for Vulkan 1.2) of the trace shader of instances, as of lsp_vulkan_trace_spirv: entry point,
- * layout, specialization constants and life are the same. */
-LSP_API const uint32_t* lsp_vulkan_instances_spirv(int counting, size_t* bytes);
+/* SPIR-V (for Vulkan 1.1, with addresses 1.2) of the trace shader of instances, as of lsp_vulkan_trace_spirv:
+ * entry point, layout, specialization constants and life are the same. Of the kind only `addresses` matters.
+ */
+LSP_API const uint32_t* lsp_vulkan_instances_spirv(const lsp_vulkan_kind* kind, int counting, size_t* bytes);
 
-/* Points `set`, of the trace shader's layout, at the buffers of assets and of instances, and at rays, hits
- * and counters; the last may be VK_NULL_HANDLE for the shader that does not count. */
+/* Points `set`, of the trace shader's layout, at the buffers of assets and of instances, at the pool (with
+ * addresses VK_NULL_HANDLE), and at rays, hits and counters; the last may be VK_NULL_HANDLE for the shader
+ * that does not count. */
 LSP_API void lsp_vulkan_write_instance_descriptors(const lsp_vulkan_functions* functions, VkDevice device,
                                                    VkDescriptorSet set, VkBuffer assets, VkBuffer instances,
-                                                   VkBuffer rays, VkBuffer hits, VkBuffer counters);
+                                                   VkBuffer pool, VkBuffer rays, VkBuffer hits,
+                                                   VkBuffer counters);
 
 /* Records the dispatch, as lsp_vulkan_record_trace; LSP_HIT_INCOMPLETE means the same, and
  * lsp_trace_instances traces that ray. */

@@ -1,8 +1,4 @@
 /* What the shaders of paths share: their buffers, random numbers, and what a surface is. */
-#ifdef LSP_INSTANCES
-#extension GL_EXT_buffer_reference : require
-#extension GL_EXT_buffer_reference_uvec2 : require
-#endif
 #include "../interface.h"
 #define LSP_PARTS_CONSTANT_ID VIEW_CONSTANT_PARTS
 #include "lsp/lsp.glsl"

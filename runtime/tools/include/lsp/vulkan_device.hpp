@@ -27,7 +27,7 @@ const char* name_of(LoadPath path);
 struct VulkanOptions {
   std::string device;       // part of the device's name; empty: a GPU if there is one, else what there is
   bool validation = false;  // the Khronos layer, core and synchronization; see validation_messages
-  bool addresses = false;   // read sections through buffer addresses even where descriptors would do
+  bool addresses = false;   // read sections through buffer addresses even where other ways would do
   bool discrete = false;    // treat the device as a discrete GPU: staging buffers, never an import on its own
 };
 
@@ -57,9 +57,10 @@ class VulkanTracer {
   // they are the buffer, and rays that the device cuts short are traced from them.
   void load(const lsp_scene& scene, uint32_t uses, LoadPath path = LoadPath::kAutomatic);
 
-  // Puts several on it, as the assets of instances: each once, however many instances it has. The device
-  // needs buffer addresses (kUnsupported), an asset cells or wide nodes for every use. Failures name the
-  // asset by its number.
+  // Puts several on it, as the assets of instances: each once, however many instances it has, all in one
+  // buffer. Where they are more than a storage buffer may hold, or are to be imported, or with
+  // options.addresses, each has its own, and the device needs buffer addresses (kUnsupported, kLimit). An
+  // asset needs cells or wide nodes for every use. Failures name the asset by its number.
   void load(std::span<const lsp_scene* const> assets, uint32_t uses, LoadPath path = LoadPath::kAutomatic);
 
   // Traces `rays` into `hits`, of the same size. Counting uses a second, slower shader.
