@@ -1,0 +1,45 @@
+// Textures of glTF documents: their pictures, and how materials use them.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <tuple>
+
+#include "import/gltf_accessor.h"
+#include "import/mesh_builder.h"
+#include "import/surface_color.h"
+
+namespace lsp {
+
+class GltfTextures {
+ public:
+  GltfTextures(const std::filesystem::path& path, const GltfDocument& document, GltfAccessors& accessors,
+               MeshBuilder& builder)
+      : path_(path), document_(document), accessors_(accessors), builder_(builder) {}
+
+  // The texture that a member of a material names; none, with a note, where it cannot be had.
+  TextureUse use(const nlohmann::json& info, const AlphaRule& rule);
+  // The mean of its texels' four components, 0 to 1, as the picture has them.
+  std::optional<glm::dvec4> mean(const nlohmann::json& info);
+
+  // Forgets the pictures where they have come to take much memory. True where it did.
+  bool trim();
+
+ private:
+  int64_t image_at(const nlohmann::json& info);
+  std::shared_ptr<Texture> texture(int64_t image, const AlphaRule& rule);
+  Picture read_picture(int64_t image);
+  std::string picture_bytes(const nlohmann::json& image);
+  void place(const nlohmann::json& info, TextureUse& use);
+  void note(const std::string& text) { builder_.note(document_.file + ": " + text); }
+
+  const std::filesystem::path& path_;
+  const GltfDocument& document_;
+  GltfAccessors& accessors_;
+  MeshBuilder& builder_;
+  std::map<int64_t, std::optional<glm::dvec4>> means_;
+  std::map<std::tuple<int64_t, AlphaMode, float, float>, std::shared_ptr<Texture>> textures_;
+  uint64_t charged_ = 0;
+};
+
+}  // namespace lsp
