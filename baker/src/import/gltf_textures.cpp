@@ -21,38 +21,42 @@ Wrap wrap_of(const json& sampler, const char* key) {
   return mode == kClampToEdge ? Wrap::kClamp : mode == kMirroredRepeat ? Wrap::kMirror : Wrap::kRepeat;
 }
 
-int64_t image_of(const json& texture) {
+// What extensions name comes before what stands there for readers without them, but for KTX2.
+std::vector<int64_t> images_of(const json& texture) {
   const json& extensions = member(texture, "extensions");
-  int64_t image = index_member(member(extensions, "EXT_texture_webp"), "source");
-  if (image < 0) image = index_member(texture, "source");
-  if (image < 0) image = index_member(member(extensions, "KHR_texture_basisu"), "source");
-  return image;
+  std::vector<int64_t> images;
+  for (const int64_t image :
+       {index_member(member(extensions, "EXT_texture_webp"), "source"), index_member(texture, "source"),
+        index_member(member(extensions, "KHR_texture_basisu"), "source")}) {
+    if (image >= 0) images.push_back(image);
+  }
+  return images;
 }
 
 }  // namespace
 
-// The picture of the texture that a material names; -1, with a note, where there is none that is read.
-int64_t GltfTextures::image_at(const json& info) {
+// The pictures of the texture that a material names; none, with a note, where none is named that is read.
+GltfTextures::Images GltfTextures::images_at(const json& info) {
   const int64_t index = index_member(info, "index");
   const json& texture = element(member(document_.looks, "textures"), index);
-  const int64_t image = image_of(texture);
+  Images images = images_of(texture);
   if (index < 0) {
     note("a texture without a number is not read; factors hold without it");
   } else if (texture.is_null()) {
     note("texture " + std::to_string(index) + " is not there; factors hold without it");
-  } else if (image < 0) {
+  } else if (images.empty()) {
     note("texture " + std::to_string(index) + " names no picture that is read; factors hold without it");
   }
-  return image;
+  return images;
 }
 
 std::optional<glm::dvec4> GltfTextures::mean(const json& info) {
   if (info.is_null()) return std::nullopt;
-  const int64_t image = image_at(info);
-  if (image < 0) return std::nullopt;
-  const auto [at, fresh] = means_.try_emplace(image);
+  const Images images = images_at(info);
+  if (images.empty()) return std::nullopt;
+  const auto [at, fresh] = means_.try_emplace(images);
   if (fresh) {
-    const Picture picture = read_picture(image);
+    const Picture picture = read_first(images);
     glm::dvec4 sum(0);
     for (size_t i = 0; i < picture.rgba.size(); i += 4)
       sum += glm::dvec4(picture.rgba[i], picture.rgba[i + 1], picture.rgba[i + 2], picture.rgba[i + 3]);
@@ -65,9 +69,9 @@ std::optional<glm::dvec4> GltfTextures::mean(const json& info) {
 TextureUse GltfTextures::use(const json& info, const AlphaRule& rule) {
   TextureUse use;
   if (info.is_null()) return use;
-  const int64_t image = image_at(info);
-  if (image < 0) return use;
-  use.texture = texture(image, rule);
+  const Images images = images_at(info);
+  if (images.empty()) return use;
+  use.texture = texture(images, rule);
   place(info, use);
   return use;
 }
@@ -109,30 +113,43 @@ std::string GltfTextures::picture_bytes(const json& image) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-// Empty, with a note that names it, where it cannot be had: the factors hold alone then.
-Picture GltfTextures::read_picture(int64_t image) {
+std::string GltfTextures::name_of(int64_t image) const {
   const json& source = element(member(document_.looks, "images"), image);
   const std::string uri = text_member(source, "uri"), given = text_member(source, "name");
-  const std::string name = !uri.empty() && !is_data_uri(uri) ? uri
-                           : !given.empty()                  ? given
-                                                             : std::to_string(image);
-  std::string why = "is not there";
-  Picture picture;
+  return !uri.empty() && !is_data_uri(uri) ? uri : !given.empty() ? given : std::to_string(image);
+}
+
+// Empty where it cannot be had, and `why` says why not.
+Picture GltfTextures::read_picture(int64_t image, std::string& why) {
+  const json& source = element(member(document_.looks, "images"), image);
+  why = "is not there";
   try {
     if (source.is_object())
-      picture = decode_picture(document_.file, picture_bytes(source), builder_.budget(), why);
+      return decode_picture(document_.file, picture_bytes(source), builder_.budget(), why);
   } catch (const Failure& failure) {
     if (failure.exit() == Exit::kLimit) throw;
     why = failure.what();
   }
-  if (picture.rgba.empty()) note("the picture " + name + " " + why + "; factors hold without it");
-  return picture;
+  return {};
 }
 
-std::shared_ptr<Texture> GltfTextures::texture(int64_t image, const AlphaRule& rule) {
-  const auto [at, fresh] = textures_.try_emplace({image, rule.mode, rule.factor, rule.cutoff});
+// The first that can be had, with a note on each before it; where none can, the factors hold alone.
+Picture GltfTextures::read_first(const Images& images) {
+  for (size_t i = 0; i < images.size(); ++i) {
+    std::string why;
+    Picture picture = read_picture(images[i], why);
+    if (!picture.rgba.empty()) return picture;
+    note(
+        "the picture " + name_of(images[i]) + " " + why +
+        (i + 1 < images.size() ? "; the next that its texture names is tried" : "; factors hold without it"));
+  }
+  return {};
+}
+
+std::shared_ptr<Texture> GltfTextures::texture(const Images& images, const AlphaRule& rule) {
+  const auto [at, fresh] = textures_.try_emplace({images, rule.mode, rule.factor, rule.cutoff});
   if (!fresh) return at->second;
-  Picture picture = read_picture(image);
+  Picture picture = read_first(images);
   if (picture.rgba.empty()) return nullptr;
   // The levels that may yet be made are charged at once.
   const uint64_t bytes = picture.rgba.size() * 7;

@@ -4,6 +4,7 @@
 #include <map>
 #include <optional>
 #include <tuple>
+#include <vector>
 
 #include "import/gltf_accessor.h"
 #include "import/mesh_builder.h"
@@ -26,9 +27,14 @@ class GltfTextures {
   bool trim();
 
  private:
-  int64_t image_at(const nlohmann::json& info);
-  std::shared_ptr<Texture> texture(int64_t image, const AlphaRule& rule);
-  Picture read_picture(int64_t image);
+  // The pictures of a texture, by their numbers, the one to be read first.
+  using Images = std::vector<int64_t>;
+
+  Images images_at(const nlohmann::json& info);
+  std::shared_ptr<Texture> texture(const Images& images, const AlphaRule& rule);
+  Picture read_first(const Images& images);
+  Picture read_picture(int64_t image, std::string& why);
+  std::string name_of(int64_t image) const;
   std::string picture_bytes(const nlohmann::json& image);
   void place(const nlohmann::json& info, TextureUse& use);
   void note(const std::string& text) { builder_.note(document_.file + ": " + text); }
@@ -37,8 +43,8 @@ class GltfTextures {
   const GltfDocument& document_;
   GltfAccessors& accessors_;
   MeshBuilder& builder_;
-  std::map<int64_t, std::optional<glm::dvec4>> means_;
-  std::map<std::tuple<int64_t, AlphaMode, float, float>, std::shared_ptr<Texture>> textures_;
+  std::map<Images, std::optional<glm::dvec4>> means_;
+  std::map<std::tuple<Images, AlphaMode, float, float>, std::shared_ptr<Texture>> textures_;
   uint64_t charged_ = 0;
 };
 
