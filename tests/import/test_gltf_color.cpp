@@ -351,6 +351,32 @@ TEST_F(GltfColor, BlendingIsTheMeanOfAlpha) {
   expect_color(color.base_color, {1 / 1.2, 0, 0.2 / 1.2}, 1e-4f);
 }
 
+TEST_F(GltfColor, GlassLetsItsShareOfLightPass) {
+  const auto glass = [&](const json& transmission, double metallic, const std::string& mode = "OPAQUE") {
+    Square square;
+    square.base() = {{"baseColorFactor", {1, 1, 1, 0.5}}, {"metallicFactor", metallic}};
+    square.material()["emissiveFactor"] = {1, 1, 1};
+    square.material()["alphaMode"] = mode;
+    json extension = transmission;
+    if (extension.contains("transmissionTexture"))
+      extension["transmissionTexture"] = square.texture(rgba_png(2, 1, {255, 0, 0, 255, 0, 255, 255, 255}));
+    square.material()["extensions"]["KHR_materials_transmission"] = extension;
+    return import(square);
+  };
+  // 9 % of light from all sides is reflected, however clear the glass.
+  const Mesh clear = glass({{"transmissionFactor", 1}}, 0);
+  EXPECT_NEAR(clear.color(0).coverage, 0.09f, 1e-6f);
+  EXPECT_NEAR(clear.color(0).coverage * clear.color(0).emission.x, 1, 1e-6f) << "it glows as it is";
+  ASSERT_EQ(clear.notes.size(), 1u);
+  EXPECT_TRUE(has_note(clear, "glass (KHR_materials_transmission) passes straight on"));
+  EXPECT_NEAR(glass({{"transmissionFactor", 0.5}}, 0).color(0).coverage, 1 - 0.5f * 0.91f, 1e-6f);
+  EXPECT_NEAR(glass({{"transmissionFactor", 1}}, 0, "BLEND").color(0).coverage, 0.5f * 0.09f, 1e-6f);
+  EXPECT_EQ(glass({{"transmissionFactor", 1}}, 1).color(0).coverage, 1) << "metals let none pass";
+  EXPECT_NEAR(glass({{"transmissionFactor", 1}, {"transmissionTexture", nullptr}}, 0).color(0).coverage,
+              1 - 0.5f * 0.91f, 1e-6f);
+  EXPECT_TRUE(glass({{"transmissionFactor", 0}}, 0).notes.empty());
+}
+
 TEST_F(GltfColor, TransparentTrianglesAreLeftOut) {
   Square square({0, 0, 0.5, 0, 0.5, 0.5, 0, 0.5});
   square.document.root["materials"].push_back(square.material());

@@ -282,12 +282,12 @@ TEST_F(Variants, GltfExtensionsThatNoListDeclaresAreNoted) {
   document.node(
       {{"mesh", document.mesh({{"attributes", {{"POSITION", document.vec3(kTriangle)}}}, {"material", 0}})}});
   document.root["materials"] = {{{"extensions",
-                                  {{"KHR_materials_transmission", {{"transmissionFactor", 1}}},
+                                  {{"KHR_materials_sheen", {{"sheenRoughnessFactor", 1}}},
                                    {"KHR_materials_emissive_strength", json::object()}}},
                                  {"extras", {{"extensions", {{"MY_tool", 1}}}}}}};
   const Mesh mesh = import("a.gltf", document.gltf());
   EXPECT_EQ(mesh.notes.size(), 1u);
-  EXPECT_TRUE(has_note(mesh, "the extension KHR_materials_transmission is not read"));
+  EXPECT_TRUE(has_note(mesh, "the extension KHR_materials_sheen is not read"));
   document.root["materials"][0] = {{"alphaMode", "GLASS"}};
   document.root["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = {
       {"TRANSLATION", document.vec3({0, 0, 1})}, {"_COLOR", document.vec3({1, 0, 0})}};

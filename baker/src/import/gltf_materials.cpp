@@ -59,13 +59,9 @@ GltfMaterials::Entry GltfMaterials::read(const json& source, uint32_t known_id) 
   }
   note_unread_textures(source);
 
-  AlphaRule alpha;
-  const std::string mode = text_member(source, "alphaMode");
-  alpha.mode = mode == "MASK" ? AlphaMode::kMask : mode == "BLEND" ? AlphaMode::kBlend : AlphaMode::kOpaque;
-  if (alpha.mode == AlphaMode::kOpaque && !mode.empty() && mode != "OPAQUE")
-    note("the alphaMode " + mode + " is not known, OPAQUE is taken for it");
-  alpha.factor = factor[3];
-  alpha.cutoff = float(numbers_.number(source, "alphaCutoff", 0.5));
+  AlphaRule alpha = alpha_rule(source, factor[3]);
+  alpha.glass = glass_share(member(extensions, "KHR_materials_transmission"), material);
+  material.emission /= 1 - alpha.glass;  // what is glass glows as if it were not
   material.base_color = {factor[0], factor[1], factor[2]};
   material.opacity = alpha.coverage(1);
   Entry entry;
@@ -75,6 +71,30 @@ GltfMaterials::Entry GltfMaterials::read(const json& source, uint32_t known_id) 
   if (bounded.emission != glm::vec3(0))
     entry.surface.glow = textures_.use(member(source, "emissiveTexture"), {});
   return entry;
+}
+
+AlphaRule GltfMaterials::alpha_rule(const json& source, float factor) {
+  AlphaRule rule;
+  const std::string mode = text_member(source, "alphaMode");
+  rule.mode = mode == "MASK" ? AlphaMode::kMask : mode == "BLEND" ? AlphaMode::kBlend : AlphaMode::kOpaque;
+  if (rule.mode == AlphaMode::kOpaque && !mode.empty() && mode != "OPAQUE")
+    note("the alphaMode " + mode + " is not known, OPAQUE is taken for it");
+  rule.factor = factor;
+  rule.cutoff = float(numbers_.number(source, "alphaCutoff", 0.5));
+  return rule;
+}
+
+// The share of light that glass lets pass. Metals let none; and of what comes from all sides, glass of index
+// 1.5 reflects a share.
+float GltfMaterials::glass_share(const json& transmission, const Material& material) {
+  constexpr double kReflected = 0.09;
+  double share = numbers_.number(transmission, "transmissionFactor", 0);
+  if (!(share > 0)) return 0;
+  if (const std::optional<glm::dvec4> mean = textures_.mean(member(transmission, "transmissionTexture")))
+    share *= mean->r;
+  note("what passes glass (KHR_materials_transmission) passes straight on and takes no colour from it");
+  return float(std::min(share, 1.0) * (1 - kReflected) *
+               (1 - std::clamp(double(material.metallic), 0.0, 1.0)));
 }
 
 void GltfMaterials::note_unread_textures(const json& source) {

@@ -147,7 +147,7 @@ Picture GltfTextures::read_first(const Images& images) {
 }
 
 std::shared_ptr<Texture> GltfTextures::texture(const Images& images, const AlphaRule& rule) {
-  const auto [at, fresh] = textures_.try_emplace({images, rule.mode, rule.factor, rule.cutoff});
+  const auto [at, fresh] = textures_.try_emplace({images, rule});
   if (!fresh) return at->second;
   Picture picture = read_first(images);
   if (picture.rgba.empty()) return nullptr;

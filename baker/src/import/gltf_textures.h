@@ -3,7 +3,6 @@
 
 #include <map>
 #include <optional>
-#include <tuple>
 #include <vector>
 
 #include "import/gltf_accessor.h"
@@ -44,7 +43,7 @@ class GltfTextures {
   GltfAccessors& accessors_;
   MeshBuilder& builder_;
   std::map<Images, std::optional<glm::dvec4>> means_;
-  std::map<std::tuple<Images, AlphaMode, float, float>, std::shared_ptr<Texture>> textures_;
+  std::map<std::pair<Images, AlphaRule>, std::shared_ptr<Texture>> textures_;
   uint64_t charged_ = 0;
 };
 
