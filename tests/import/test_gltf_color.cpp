@@ -461,6 +461,29 @@ TEST_F(GltfColor, SpecularGlossinessHasItsOwnTexture) {
   EXPECT_NEAR(mesh.colors[0].coverage, 127 / 255.0f, 1e-4f);
 }
 
+TEST_F(GltfColor, SpecularGlossinessHasMetals) {
+  const auto read = [&](json glossy, const std::vector<uint8_t>& texel) {
+    Square square;
+    if (!texel.empty()) glossy["specularGlossinessTexture"] = square.texture(rgba_png(1, 1, texel));
+    square.material()["extensions"]["KHR_materials_pbrSpecularGlossiness"] = glossy;
+    return import(square);
+  };
+  const Mesh gold = read({{"diffuseFactor", {0, 0, 0, 1}}, {"specularFactor", {1, 0.75, 0.25}}}, {});
+  expect_color(gold.color(0).base_color, {1, 0.75, 0.25});
+  EXPECT_EQ(gold.materials[gold.material_ids[0]].metallic, 1);
+  EXPECT_TRUE(gold.notes.empty());
+
+  const Mesh textured =
+      read({{"diffuseFactor", {0, 0, 0, 1}}, {"specularFactor", {1, 1, 0.5}}}, {255, 188, 255, 51});
+  expect_color(textured.color(0).base_color, {1, linear(188), 0.5});
+  EXPECT_NEAR(textured.materials[textured.material_ids[0]].roughness, 0.8f, 1e-5f);
+  EXPECT_TRUE(has_note(textured, "specular-glossiness textures are taken as their mean"));
+
+  const Mesh coal = read({{"diffuseFactor", {0, 0, 0, 1}}, {"specularFactor", {0.04, 0.04, 0.04}}}, {});
+  EXPECT_EQ(coal.materials[coal.material_ids[0]].metallic, 0);
+  expect_color(coal.color(0).base_color, {0, 0, 0});
+}
+
 TEST_F(GltfColor, DamagedPicturesAndReferencesDoNoHarm) {
   std::vector<uint8_t> texels(16 * 16 * 4);
   for (size_t i = 0; i < texels.size(); ++i) texels[i] = uint8_t(i * 37);

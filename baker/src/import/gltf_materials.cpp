@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "import/json_member.h"
+#include "import/texture.h"
 
 namespace lsp {
 
@@ -36,19 +37,7 @@ GltfMaterials::Entry GltfMaterials::read(const json& source, uint32_t known_id) 
   material.emission *=
       float(numbers_.number(member(extensions, "KHR_materials_emissive_strength"), "emissiveStrength", 1));
   if (const json& glossy = member(extensions, "KHR_materials_pbrSpecularGlossiness"); glossy.is_object()) {
-    std::fill(std::begin(factor), std::end(factor), 1.0f);
-    numbers_.numbers(glossy, "diffuseFactor", 4, factor);
-    base = &member(glossy, "diffuseTexture");
-    material.roughness = 1.0f - float(numbers_.number(glossy, "glossinessFactor", 1));
-    material.metallic = 0;
-    float specular[3] = {1, 1, 1};
-    numbers_.numbers(glossy, "specularFactor", 3, specular);
-    if (std::any_of(std::begin(specular), std::end(specular), [](float x) { return x != 0; }))
-      note(
-          "specular factors of KHR_materials_pbrSpecularGlossiness are not read, its materials are no "
-          "metals");
-    if (!member(glossy, "specularGlossinessTexture").is_null())
-      note("specular-glossiness textures are not read, the glossiness factor holds");
+    base = read_glossy(glossy, factor, material);
   } else {
     mean_roughness(member(pbr, "metallicRoughnessTexture"), material);
   }
@@ -71,6 +60,44 @@ GltfMaterials::Entry GltfMaterials::read(const json& source, uint32_t known_id) 
   if (bounded.emission != glm::vec3(0))
     entry.surface.glow = textures_.use(member(source, "emissiveTexture"), {});
   return entry;
+}
+
+// KHR_materials_pbrSpecularGlossiness: returns the texture of the base colour. A black diffuse colour beside
+// a bright specular one is a metal, of the specular colour; elsewhere the specular colour counts for nothing.
+const json* GltfMaterials::read_glossy(const json& glossy, float (&factor)[4], Material& material) {
+  static const json kNone;
+  constexpr double kBlack = 0.04, kBright = 0.25;
+  std::fill(std::begin(factor), std::end(factor), 1.0f);
+  numbers_.numbers(glossy, "diffuseFactor", 4, factor);
+  const json *diffuse = &member(glossy, "diffuseTexture"),
+             &gloss = member(glossy, "specularGlossinessTexture");
+  double specular[3] = {1, 1, 1}, glossiness = numbers_.number(glossy, "glossinessFactor", 1);
+  numbers_.numbers(glossy, "specularFactor", 3, specular);
+  const std::optional<glm::dvec4> gloss_mean = textures_.mean(gloss), diffuse_mean = textures_.mean(*diffuse);
+  double most_diffuse = 0, most_specular = 0;
+  for (int i = 0; i < 3; ++i) {
+    if (gloss_mean) specular[i] *= linear_of_srgb((*gloss_mean)[i]);
+    most_specular = std::max(most_specular, specular[i]);
+    most_diffuse =
+        std::max(most_diffuse, double(factor[i]) * (diffuse_mean ? linear_of_srgb((*diffuse_mean)[i]) : 1.0));
+  }
+  if (gloss_mean) {
+    glossiness *= gloss_mean->a;
+    note("specular-glossiness textures are taken as their mean");
+  }
+  material.roughness = 1.0f - float(glossiness);
+  material.metallic = most_diffuse < kBlack && most_specular > kBright;
+  if (material.metallic == 0) {
+    if (most_specular > 0)
+      note(
+          "specular colours of KHR_materials_pbrSpecularGlossiness are not read where the diffuse one is not "
+          "black, these materials are no metals");
+    return diffuse;
+  }
+  for (int i = 0; i < 3; ++i) factor[i] = float(specular[i]);
+  if (diffuse_mean)
+    note("the diffuse textures of metals of KHR_materials_pbrSpecularGlossiness are not read");
+  return &kNone;
 }
 
 AlphaRule GltfMaterials::alpha_rule(const json& source, float factor) {

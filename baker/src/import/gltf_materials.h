@@ -32,6 +32,7 @@ class GltfMaterials {
  private:
   Entry read(const nlohmann::json& source, uint32_t known_id);
   void mean_roughness(const nlohmann::json& info, Material& material);
+  const nlohmann::json* read_glossy(const nlohmann::json& glossy, float (&factor)[4], Material& material);
   AlphaRule alpha_rule(const nlohmann::json& source, float factor);
   float glass_share(const nlohmann::json& transmission, const Material& material);
   void note_unread_textures(const nlohmann::json& source);
