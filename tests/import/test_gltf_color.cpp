@@ -4,6 +4,7 @@
 #include "gltf_builder.h"
 #include "import/texture.h"
 #include "png_bytes.h"
+#include "text_files.h"
 
 namespace {
 
@@ -108,6 +109,29 @@ TEST_F(GltfColor, EveryKindOfPng) {
   }
 }
 
+// Xcode's PNG: a chunk of its own, no header of zlib's, blue first, multiplied by alpha.
+TEST_F(GltfColor, PngAsXcodeMakesIt) {
+  const auto chunk = [](const std::string& type, const std::string& data) {
+    std::string out;
+    append_ordered(out, uint32_t(data.size()), true);
+    return out + type + data + "crc?";
+  };
+  const auto png = [&](const std::string& bgra) {
+    std::string row = std::string(1, '\0') + bgra, stored("\1", 1);
+    append(stored, uint16_t(row.size()));
+    append(stored, uint16_t(~row.size()));
+    return "\x89PNG\r\n\x1a\n" + chunk("CgBI", std::string("P\0 \2", 4)) +
+           chunk("IHDR", std::string("\0\0\0\1\0\0\0\1\x08\6\0\0\0", 13)) + chunk("IDAT", stored + row) +
+           chunk("IEND", "");
+  };
+  Square square;
+  square.base()["baseColorTexture"] = square.texture(png({25, 50, 100, char(128)}));
+  square.material()["alphaMode"] = "BLEND";
+  const Mesh mesh = import(square);
+  expect_color(mesh.color(0).base_color, {linear(199), linear(100), linear(50)}, 0.01f);
+  EXPECT_NEAR(mesh.color(0).coverage, 128 / 255.0f, 1e-5f);
+}
+
 // Eight by eight equal texels in CMYK, inks inverted as everywhere, with and without Adobe's marker.
 TEST_F(GltfColor, JpegOfFourInks) {
   const std::string hex =
@@ -128,6 +152,23 @@ TEST_F(GltfColor, JpegOfFourInks) {
     ASSERT_EQ(mesh.colors.size(), 2u);
     expect_color(mesh.colors[0].base_color, {linear(200), linear(100), linear(50)}, 0.02f);
     EXPECT_TRUE(mesh.notes.empty());
+  }
+  for (const char orientation : {1, 6}) {
+    std::string exif(
+        "\xFF\xE1\0\x22"
+        "Exif\0\0"
+        "II*\0\x08\0\0\0"
+        "\1\0"
+        "\x12\1\3\0\1\0\0\0_\0\0\0"
+        "\0\0\0\0",
+        36);
+    exif[exif.find('_')] = orientation;
+    Square square;
+    square.base()["baseColorTexture"] = square.texture(start + exif + body);
+    const Mesh mesh = import(square);
+    expect_color(mesh.colors[0].base_color, {linear(200), linear(100), linear(50)}, 0.02f);
+    EXPECT_EQ(has_note(mesh, "the turn that its EXIF data ask for is not made"), orientation == 6);
+    EXPECT_EQ(mesh.notes.empty(), orientation == 1);
   }
   // More codes than a byte can count, and a table that begins at its segment's last byte.
   std::string many = start + body, late = many;

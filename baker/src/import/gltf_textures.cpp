@@ -138,6 +138,7 @@ Picture GltfTextures::read_first(const Images& images) {
   for (size_t i = 0; i < images.size(); ++i) {
     std::string why;
     Picture picture = read_picture(images[i], why);
+    if (picture.turned) note("the picture " + name_of(images[i]) + kTurned);
     if (!picture.rgba.empty()) return picture;
     note(
         "the picture " + name_of(images[i]) + " " + why +

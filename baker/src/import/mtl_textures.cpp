@@ -106,6 +106,7 @@ Picture MtlTextures::read(const MtlMaterial& source, const MtlMap& map) {
     picture = decode_picture(file_, bytes, builder_.budget(), why);
     builder_.budget().release(bytes.size());
   }
+  if (picture.turned) builder_.note(file_ + ": the picture " + map.file + kTurned);
   if (picture.rgba.empty())
     builder_.note(file_ + ": the picture " + map.file + " " + why + "; factors hold without it");
   return picture;
