@@ -40,6 +40,12 @@ TEST_F(Variants, PlyColoursOfEveryType) {
   expect_color(import("a.ply", ply(rgb("uchar"), "255 0 128")), right);
   expect_color(import("a.ply", ply(rgb("ushort"), "65535 0 32896")), right);
   expect_color(import("a.ply", ply(rgb("int"), "255 0 128")), right);
+  expect_color(import("a.ply", ply(rgb("uint"), "65535 0 32896")), right);
+  expect_color(import("a.ply", ply(rgb("uint"), "4294967295 0 2155905152")), right);
+  expect_color(import("a.ply", ply(rgb("char"), "-1 0 -128")), right);
+  const Mesh bytes = import("a.ply", ply(rgb("ushort"), "255 0 128"));
+  expect_color(bytes, right);
+  EXPECT_TRUE(has_note(bytes, "no colour of 16 bits is above 255, they are taken as bytes"));
   expect_color(import("a.ply", ply(rgb("float"), "255 0 128")), right);
   expect_color(import("a.ply", ply(rgb("float"), "1 0 0.50196")), right);
   expect_color(import("a.ply", ply(rgb("uchar", "r", "g", "b"), "255 0 128")), right);
@@ -203,6 +209,18 @@ TEST_F(Variants, OffColoursByTheirLargest) {
   std::string two = off("OFF", "", " 255 0 0") + "3 0 2 1\n";
   two.replace(two.find("3 1 0"), 5, "3 2 0");
   EXPECT_EQ(import("a.off", two).color(1).base_color, glm::vec3(1));
+}
+
+TEST_F(Variants, FacesWithoutAColourHaveTheirVertices) {
+  std::string two = off("COFF", "255 0 0 255", " 0 255 0") + "3 0 2 1\n";
+  two.replace(two.find("3 1 0"), 5, "3 2 0");
+  const Mesh mesh = import("a.off", two);
+  EXPECT_EQ(mesh.color(0).base_color, glm::vec3(0, 1, 0));
+  EXPECT_EQ(mesh.color(1).base_color, glm::vec3(1, 0, 0));
+  ASSERT_EQ(mesh.notes.size(), 1u);
+  EXPECT_TRUE(has_note(mesh, "colours of vertices are not read where faces have their own"));
+  EXPECT_TRUE(has_note(import("a.ply", ply(rgb("uchar"), "255 0 0", rgb("uchar"), " 0 0 255")),
+                       "colours of vertices are not read where faces have their own"));
 }
 
 TEST_F(Variants, OffKeywords) {
