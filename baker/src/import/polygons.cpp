@@ -228,7 +228,8 @@ void add_polygons(const std::string& file, const PolygonSoup& soup, MeshBuilder&
       normals[i] = normal < soup.normals.size() ? soup.normals[normal]
                                                 : glm::vec3(std::numeric_limits<float>::quiet_NaN());
     }
-    builder.add(triangle, normals, material_of(soup, piece.face), color);
+    const uint32_t smoothing = piece.face < soup.smoothing.size() ? soup.smoothing[piece.face] : kNoGroup;
+    builder.add(triangle, normals, material_of(soup, piece.face), color, smoothing);
   };
   if (soup.has_colors()) {
     builder.budget().charge(file, soup.triangle_count(),

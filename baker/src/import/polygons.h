@@ -26,6 +26,7 @@ struct PolygonSoup {
   std::vector<uint32_t> face_ends;       // one past the face's last corner
   std::vector<uint32_t> materials;       // per face; empty: all `material`
   uint32_t material = 0;
+  std::vector<uint32_t> smoothing;  // groups per face; those beyond its end are of kNoGroup
   // What gives triangles colours of their own; all empty where nothing does.
   std::vector<glm::dvec2> texcoords;           // their origin at the picture's upper left
   std::vector<uint32_t> corner_texcoords;      // into texcoords (kNoIndex: none); empty or as long as corners
