@@ -414,6 +414,34 @@ TEST_F(Variants, MapOptionsThatChangeNothingAreNoNotes) {
   EXPECT_TRUE(has_note(import("a.obj", obj), "the option -mm of a map is not read"));
 }
 
+TEST_F(Variants, MapOptionsInAnyCaseUnknownOnesAndNamesLikeThem) {
+  write("red.png", rgba_png(1, 1, {255, 0, 0, 255}));
+  write("-o.png", rgba_png(1, 1, {255, 0, 0, 255}));
+  const auto notes_of = [&](const std::string& map) {
+    write("a.mtl", "newmtl m\n" + map + "\n");
+    const Mesh mesh =
+        import("a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nusemtl m\nf 1/1 2/1 3/1\n");
+    EXPECT_EQ(mesh.color(0).base_color, glm::vec3(1, 0, 0)) << map;
+    std::string notes;
+    for (const std::string& note : mesh.notes) notes += note + "\n";
+    return notes;
+  };
+  EXPECT_EQ(notes_of("map_Kd -S 2 2 1 -O 0.5 0 0 -CLAMP off red.png"), "");
+  EXPECT_EQ(notes_of("map_Kd -o.png"), "");
+  EXPECT_EQ(notes_of("map_Kd red.png # a comment"), "");
+  EXPECT_EQ(notes_of("map_Kd \\\nred.png"), "");
+  EXPECT_NE(notes_of("map_Kd -colorspace linear red.png").find("the option -colorspace of a map is not read"),
+            std::string::npos);
+}
+
+TEST_F(Variants, MtlStatementsBeforeTheFirstMaterialAreNoted) {
+  write("a.mtl", "# a comment\nKd 1 0 0\nnewmtl m\nKd 0 1 0\n");
+  const Mesh mesh = import("a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nusemtl m\nf 1 2 3\n");
+  EXPECT_EQ(mesh.color(0).base_color, glm::vec3(0, 1, 0));
+  ASSERT_EQ(mesh.notes.size(), 1u);
+  EXPECT_TRUE(has_note(mesh, "statements before the first newmtl"));
+}
+
 TEST_F(Variants, MtlColoursBeyondTheirRangeAreCutWithANote) {
   write("a.mtl", "newmtl m\nKd 255 128 0\n");
   const Mesh mesh = import("a.obj", "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
