@@ -374,6 +374,19 @@ TEST_F(Variants, StlNormalsOfZeroAskForTheTrianglesOwn) {
   }
 }
 
+TEST_F(Variants, StlNormalsThatDoNotStandOnTheirFacets) {
+  const auto facet = [&](const std::string& normal) {
+    return import("a.stl", "solid a\nfacet normal " + normal +
+                               "\nouter loop\nvertex 0 0 0\nvertex 0 1 0\nvertex 1 0 0\nendloop\nendfacet\n");
+  };
+  const Mesh along = facet("1 0 0");
+  EXPECT_EQ(along.normals[0][0], glm::vec3(0, 0, -1));
+  EXPECT_TRUE(has_note(along, "the normals of 1 facets do not stand on them"));
+  for (const char* near : {"0 0 -3", "0.1 0 -1", "nan nan nan"})
+    EXPECT_TRUE(facet(near).notes.empty()) << near;
+  EXPECT_EQ(facet("0 0 1").normals[0][0], glm::vec3(0, 0, 1)) << "which side is out, the file says";
+}
+
 TEST_F(Variants, StlWithItsBytesInTheOtherOrder) {
   std::string bytes(80, ' ');
   append(bytes, __builtin_bswap32(2));
