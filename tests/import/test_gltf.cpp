@@ -105,6 +105,13 @@ TEST_F(Gltf, ScenesWithoutADefaultAreAllRead) {
   const Mesh mesh = import(document);
   EXPECT_EQ(mesh.triangles.size(), 2u);
   EXPECT_TRUE(has_note(mesh, "none of its scenes is the default one"));
+  EXPECT_EQ(mesh.notes.size(), 1u);
+  document.root["scenes"].erase(1);
+  const Mesh one = import(document);
+  EXPECT_EQ(one.triangles.size(), 2u);
+  EXPECT_TRUE(has_note(one, "all nodes are read: 1 of them are in no scene"));
+  document.root.erase("scenes");
+  EXPECT_TRUE(import(document).notes.empty());
 }
 
 TEST_F(Gltf, WhatIsNotReadIsNotedOnce) {

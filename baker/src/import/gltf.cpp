@@ -69,7 +69,7 @@ class GltfReader {
   }
 
   // The default scene's nodes; without a default scene, all nodes that are no other node's child.
-  std::vector<int> find_roots() const {
+  std::vector<int> find_roots() {
     if (model_.defaultScene >= 0) {
       if (size_t(model_.defaultScene) >= model_.scenes.size())
         fail("names a default scene that is not there");
@@ -82,10 +82,22 @@ class GltfReader {
         is_child[size_t(child)] = true;
       }
     }
-    std::vector<int> roots;
-    for (size_t i = 0; i < model_.nodes.size(); ++i) {
-      if (!is_child[i]) roots.push_back(int(i));
+    std::vector<bool> in_scene(model_.nodes.size(), model_.scenes.empty());
+    for (const tinygltf::Scene& scene : model_.scenes) {
+      for (const int node : scene.nodes) {
+        if (node >= 0 && size_t(node) < in_scene.size()) in_scene[size_t(node)] = true;
+      }
     }
+    std::vector<int> roots;
+    size_t in_none = 0;
+    for (size_t i = 0; i < model_.nodes.size(); ++i) {
+      if (is_child[i]) continue;
+      roots.push_back(int(i));
+      in_none += !in_scene[i];
+    }
+    if (in_none)
+      builder_.note(document_->file + ": no scene is the default one, all nodes are read: " +
+                    std::to_string(in_none) + " of them are in no scene");
     return roots;
   }
 
