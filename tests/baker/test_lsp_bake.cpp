@@ -124,6 +124,38 @@ TEST_F(LspBake, SmallThingsStaySmall) {
   EXPECT_GT(bytes_of(nlohmann::json::parse(read("out"))).tables, 0u) << "asked for";
 }
 
+// A cone whose triangles all meet at its tip, and as many specks in one cell of any grid.
+TEST_F(LspBake, WhatNoCellCanHoldHasExactRaysAlone) {
+  constexpr int kTriangles = 9000;
+  std::ofstream cone(folder_ / "cone.obj"), specks(folder_ / "specks.obj");
+  cone << "v 0 1 0\n";
+  specks << "v -9 -9 -9\nv 9 9 9\nv -9 9 9\nf 1 2 3\n";
+  for (int i = 0; i < kTriangles; ++i) {
+    const double angle = 6.283185307179586 * i / kTriangles, x = std::cos(angle), z = std::sin(angle);
+    cone << "v " << x << " 0 " << z << "\n";
+    cone << "f 1 " << i + 2 << " " << (i + 1) % kTriangles + 2 << "\n";
+    specks << "v " << x / 1000 << " " << (i + 1) * 1e-6 << " " << z / 1000 << "\nv 0 " << i * 1e-6
+           << " 1e-5\nv 0 " << i * 1e-6 << " 0\nf -3 -2 -1\n";
+  }
+  cone.close();
+  specks.close();
+  const auto start = std::chrono::steady_clock::now();
+  const std::pair<const char*, const char*> cases[] = {{"cone", "9,000 triangles meet in one corner"},
+                                                       {"specks", "a cell would hold 900"}};
+  for (const auto& [name, why] : cases) {
+    ASSERT_EQ(run(std::string(name) + ".obj -o a.lsp --json"), 0) << read("err");
+    const auto report = nlohmann::json::parse(read("out"));
+    EXPECT_EQ(bytes_of(report).tables, 0u) << name;
+    EXPECT_NE(report["skipped"].dump().find("tables: " + std::string(why)), std::string::npos)
+        << report["skipped"];
+    EXPECT_NE(read("a.lsp").find("\"base\":\"wide\""), std::string::npos);
+  }
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(60)) << "not by trying every grid";
+  EXPECT_EQ(run("cone.obj -o b.lsp --base cells"), 6);
+  EXPECT_NE(read("err").find("9,000 triangles meet in one corner"), std::string::npos) << read("err");
+  EXPECT_EQ(run("cone.obj -o b.part --shard 1/2"), 6);
+}
+
 TEST_F(LspBake, HelpBeginsWithWhatMostPeopleNeed) {
   ASSERT_EQ(run("--help"), 0);
   const std::string help = read("out");

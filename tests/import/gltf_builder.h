@@ -7,6 +7,11 @@
 
 #include "mesh_files.h"
 
+// Of the importer's tinygltf (import/tinygltf.h), which does not declare it.
+namespace lsp_tinygltf {
+std::string base64_encode(const unsigned char* bytes, unsigned int count);
+}
+
 namespace lsp_test {
 
 using nlohmann::json;
@@ -14,14 +19,8 @@ using nlohmann::json;
 inline constexpr int kByte = 5120, kUbyte = 5121, kShort = 5122, kUshort = 5123, kUint = 5125, kFloat = 5126;
 
 inline std::string base64(const std::string& bytes) {
-  const char* digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string out;
-  for (size_t i = 0; i < bytes.size(); i += 3) {
-    uint32_t bits = 0;
-    for (size_t k = 0; k < 3; ++k) bits = bits << 8 | (i + k < bytes.size() ? uint8_t(bytes[i + k]) : 0u);
-    for (size_t k = 0; k < 4; ++k) out += i + k > bytes.size() ? '=' : digits[bits >> (18 - 6 * k) & 63];
-  }
-  return out;
+  return lsp_tinygltf::base64_encode(reinterpret_cast<const unsigned char*>(bytes.data()),
+                                     unsigned(bytes.size()));
 }
 
 // A document with one buffer that grows as accessors are added.

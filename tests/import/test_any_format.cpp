@@ -51,7 +51,7 @@ TEST_F(AnyFormat, FarFromTheOriginTheMeshHasOneOfItsOwn) {
   for (int i = 0; i < 1000; ++i) {
     const double x = 471234.5625 + 0.01 * i, y = 5412345.125;
     char line[200];
-    stl += "facet normal 0 0 1\nouter loop\n";
+    stl += "facet normal 0 -1 0.02\nouter loop\n";
     for (const glm::dvec3& p :
          {glm::dvec3(x, y, 0), glm::dvec3(x + 0.01, y, 0), glm::dvec3(x, y + 0.01, 0.5)}) {
       exact.push_back(p);

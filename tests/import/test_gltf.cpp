@@ -105,6 +105,13 @@ TEST_F(Gltf, ScenesWithoutADefaultAreAllRead) {
   const Mesh mesh = import(document);
   EXPECT_EQ(mesh.triangles.size(), 2u);
   EXPECT_TRUE(has_note(mesh, "none of its scenes is the default one"));
+  EXPECT_EQ(mesh.notes.size(), 1u);
+  document.root["scenes"].erase(1);
+  const Mesh one = import(document);
+  EXPECT_EQ(one.triangles.size(), 2u);
+  EXPECT_TRUE(has_note(one, "all nodes are read: 1 of them are in no scene"));
+  document.root.erase("scenes");
+  EXPECT_TRUE(import(document).notes.empty());
 }
 
 TEST_F(Gltf, WhatIsNotReadIsNotedOnce) {
@@ -339,7 +346,7 @@ TEST_F(Gltf, MaterialsAndTheirExtensions) {
   document.root["meshes"][0]["primitives"].push_back({{"attributes", {{"POSITION", 0}}}, {"material", 77}});
   const Mesh mesh = import(document);
   ASSERT_EQ(mesh.triangles.size(), 3u);
-  EXPECT_TRUE(has_note(mesh, "specular factors of KHR_materials_pbrSpecularGlossiness are not read"));
+  EXPECT_TRUE(has_note(mesh, "specular colours of KHR_materials_pbrSpecularGlossiness are not read"));
   const lsp::Material& lamp = mesh.materials[mesh.material_ids[0]];
   EXPECT_EQ(lamp.name, "lamp \xC3\xA9");
   EXPECT_FLOAT_EQ(lamp.base_color.g, 0.2f);

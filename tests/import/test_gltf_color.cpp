@@ -4,6 +4,7 @@
 #include "gltf_builder.h"
 #include "import/texture.h"
 #include "png_bytes.h"
+#include "text_files.h"
 
 namespace {
 
@@ -108,6 +109,29 @@ TEST_F(GltfColor, EveryKindOfPng) {
   }
 }
 
+// Xcode's PNG: a chunk of its own, no header of zlib's, blue first, multiplied by alpha.
+TEST_F(GltfColor, PngAsXcodeMakesIt) {
+  const auto chunk = [](const std::string& type, const std::string& data) {
+    std::string out;
+    append_ordered(out, uint32_t(data.size()), true);
+    return out + type + data + "crc?";
+  };
+  const auto png = [&](const std::string& bgra) {
+    std::string row = std::string(1, '\0') + bgra, stored("\1", 1);
+    append(stored, uint16_t(row.size()));
+    append(stored, uint16_t(~row.size()));
+    return "\x89PNG\r\n\x1a\n" + chunk("CgBI", std::string("P\0 \2", 4)) +
+           chunk("IHDR", std::string("\0\0\0\1\0\0\0\1\x08\6\0\0\0", 13)) + chunk("IDAT", stored + row) +
+           chunk("IEND", "");
+  };
+  Square square;
+  square.base()["baseColorTexture"] = square.texture(png({25, 50, 100, char(128)}));
+  square.material()["alphaMode"] = "BLEND";
+  const Mesh mesh = import(square);
+  expect_color(mesh.color(0).base_color, {linear(199), linear(100), linear(50)}, 0.01f);
+  EXPECT_NEAR(mesh.color(0).coverage, 128 / 255.0f, 1e-5f);
+}
+
 // Eight by eight equal texels in CMYK, inks inverted as everywhere, with and without Adobe's marker.
 TEST_F(GltfColor, JpegOfFourInks) {
   const std::string hex =
@@ -128,6 +152,23 @@ TEST_F(GltfColor, JpegOfFourInks) {
     ASSERT_EQ(mesh.colors.size(), 2u);
     expect_color(mesh.colors[0].base_color, {linear(200), linear(100), linear(50)}, 0.02f);
     EXPECT_TRUE(mesh.notes.empty());
+  }
+  for (const char orientation : {1, 6}) {
+    std::string exif(
+        "\xFF\xE1\0\x22"
+        "Exif\0\0"
+        "II*\0\x08\0\0\0"
+        "\1\0"
+        "\x12\1\3\0\1\0\0\0_\0\0\0"
+        "\0\0\0\0",
+        36);
+    exif[exif.find('_')] = orientation;
+    Square square;
+    square.base()["baseColorTexture"] = square.texture(start + exif + body);
+    const Mesh mesh = import(square);
+    expect_color(mesh.colors[0].base_color, {linear(200), linear(100), linear(50)}, 0.02f);
+    EXPECT_EQ(has_note(mesh, "the turn that its EXIF data ask for is not made"), orientation == 6);
+    EXPECT_EQ(mesh.notes.empty(), orientation == 1);
   }
   // More codes than a byte can count, and a table that begins at its segment's last byte.
   std::string many = start + body, late = many;
@@ -351,6 +392,32 @@ TEST_F(GltfColor, BlendingIsTheMeanOfAlpha) {
   expect_color(color.base_color, {1 / 1.2, 0, 0.2 / 1.2}, 1e-4f);
 }
 
+TEST_F(GltfColor, GlassLetsItsShareOfLightPass) {
+  const auto glass = [&](const json& transmission, double metallic, const std::string& mode = "OPAQUE") {
+    Square square;
+    square.base() = {{"baseColorFactor", {1, 1, 1, 0.5}}, {"metallicFactor", metallic}};
+    square.material()["emissiveFactor"] = {1, 1, 1};
+    square.material()["alphaMode"] = mode;
+    json extension = transmission;
+    if (extension.contains("transmissionTexture"))
+      extension["transmissionTexture"] = square.texture(rgba_png(2, 1, {255, 0, 0, 255, 0, 255, 255, 255}));
+    square.material()["extensions"]["KHR_materials_transmission"] = extension;
+    return import(square);
+  };
+  // 9 % of light from all sides is reflected, however clear the glass.
+  const Mesh clear = glass({{"transmissionFactor", 1}}, 0);
+  EXPECT_NEAR(clear.color(0).coverage, 0.09f, 1e-6f);
+  EXPECT_NEAR(clear.color(0).coverage * clear.color(0).emission.x, 1, 1e-6f) << "it glows as it is";
+  ASSERT_EQ(clear.notes.size(), 1u);
+  EXPECT_TRUE(has_note(clear, "glass (KHR_materials_transmission) passes straight on"));
+  EXPECT_NEAR(glass({{"transmissionFactor", 0.5}}, 0).color(0).coverage, 1 - 0.5f * 0.91f, 1e-6f);
+  EXPECT_NEAR(glass({{"transmissionFactor", 1}}, 0, "BLEND").color(0).coverage, 0.5f * 0.09f, 1e-6f);
+  EXPECT_EQ(glass({{"transmissionFactor", 1}}, 1).color(0).coverage, 1) << "metals let none pass";
+  EXPECT_NEAR(glass({{"transmissionFactor", 1}, {"transmissionTexture", nullptr}}, 0).color(0).coverage,
+              1 - 0.5f * 0.91f, 1e-6f);
+  EXPECT_TRUE(glass({{"transmissionFactor", 0}}, 0).notes.empty());
+}
+
 TEST_F(GltfColor, TransparentTrianglesAreLeftOut) {
   Square square({0, 0, 0.5, 0, 0.5, 0.5, 0, 0.5});
   square.document.root["materials"].push_back(square.material());
@@ -433,6 +500,29 @@ TEST_F(GltfColor, SpecularGlossinessHasItsOwnTexture) {
   const Mesh mesh = import(square);
   expect_color(mesh.colors[0].base_color, {0.5, 0, 0});
   EXPECT_NEAR(mesh.colors[0].coverage, 127 / 255.0f, 1e-4f);
+}
+
+TEST_F(GltfColor, SpecularGlossinessHasMetals) {
+  const auto read = [&](json glossy, const std::vector<uint8_t>& texel) {
+    Square square;
+    if (!texel.empty()) glossy["specularGlossinessTexture"] = square.texture(rgba_png(1, 1, texel));
+    square.material()["extensions"]["KHR_materials_pbrSpecularGlossiness"] = glossy;
+    return import(square);
+  };
+  const Mesh gold = read({{"diffuseFactor", {0, 0, 0, 1}}, {"specularFactor", {1, 0.75, 0.25}}}, {});
+  expect_color(gold.color(0).base_color, {1, 0.75, 0.25});
+  EXPECT_EQ(gold.materials[gold.material_ids[0]].metallic, 1);
+  EXPECT_TRUE(gold.notes.empty());
+
+  const Mesh textured =
+      read({{"diffuseFactor", {0, 0, 0, 1}}, {"specularFactor", {1, 1, 0.5}}}, {255, 188, 255, 51});
+  expect_color(textured.color(0).base_color, {1, linear(188), 0.5});
+  EXPECT_NEAR(textured.materials[textured.material_ids[0]].roughness, 0.8f, 1e-5f);
+  EXPECT_TRUE(has_note(textured, "specular-glossiness textures are taken as their mean"));
+
+  const Mesh coal = read({{"diffuseFactor", {0, 0, 0, 1}}, {"specularFactor", {0.04, 0.04, 0.04}}}, {});
+  EXPECT_EQ(coal.materials[coal.material_ids[0]].metallic, 0);
+  expect_color(coal.color(0).base_color, {0, 0, 0});
 }
 
 TEST_F(GltfColor, DamagedPicturesAndReferencesDoNoHarm) {

@@ -156,6 +156,28 @@ TEST_F(GltfVariants, AFallbackBesideWhatIsNotReadIsUsed) {
   }
 }
 
+TEST_F(GltfVariants, ADamagedPictureLeavesTheOneBesideIt) {
+  const std::string red = rgba_png(1, 1, {255, 0, 0, 255}), bad = std::string("RIFF\x10\0\0\0WEBPVP8 xx", 18);
+  const auto with = [&](const std::string& plain, const std::string& webp) {
+    Square square;
+    square.root["images"] = {{{"bufferView", square.view(plain)}},
+                             {{"bufferView", square.view(webp)}, {"name", "wall"}}};
+    square.root["textures"] = {{{"source", 0}, {"extensions", {{"EXT_texture_webp", {{"source", 1}}}}}}};
+    square.material()["pbrMetallicRoughness"]["baseColorTexture"]["index"] = 0;
+    square.primitive()["attributes"]["TEXCOORD_0"] =
+        square.values<float>({0, 0, 1, 0, 1, 1, 0, 1}, kFloat, "VEC2", 2);
+    return import(square);
+  };
+  const Mesh mesh = with(red, bad);
+  EXPECT_EQ(mesh.color(0).base_color, glm::vec3(1, 0, 0));
+  EXPECT_TRUE(has_note(mesh, "wall is damaged WebP; the next that its texture names is tried"));
+  EXPECT_EQ(mesh.notes.size(), 1u);
+
+  const Mesh neither = with("no picture", bad);
+  EXPECT_EQ(neither.color(0).base_color, glm::vec3(1));
+  EXPECT_TRUE(has_note(neither, "the picture 0 is of no format known here, or damaged; factors hold"));
+}
+
 TEST_F(GltfVariants, NodesThatAreNotVisibleAreLeftOut) {
   Square square;
   square.root["extensionsUsed"] = square.root["extensionsRequired"] = {"KHR_node_visibility"};

@@ -91,6 +91,34 @@ TEST_F(Obj, CornersHaveTheirOwnNormals) {
   EXPECT_TRUE(has_note(mesh, "2 corner normals"));
 }
 
+TEST_F(Obj, ReferencesToNothingAreNoted) {
+  const Mesh normals = import("a.obj", kSquare + "vn 0 0 1\nf 1//1 2//1 3//9\n");
+  EXPECT_TRUE(has_note(normals, "faces refer to normals that are not there"));
+  EXPECT_TRUE(
+      has_note(import("a.obj", kSquare + "vt 0 0\nf 1/1 2/0 3/1\n"), "texture coordinates that are not"));
+  EXPECT_TRUE(import("a.obj", "f 1/1/1 2/1/1 3/1/1\n" + kSquare + "vt 0 0\nvn 0 0 1\n").notes.empty());
+  EXPECT_TRUE(import("a.obj", kSquare + "f 1/ 2/ 3/\nf 1// 3// 4//\n").notes.empty());
+}
+
+// Two faces that bend by 22 degrees.
+TEST_F(Obj, SmoothingGroupsShareNoNormals) {
+  const std::string bent = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 1 2 0.4\nv 0 2 0.4\n";
+  const auto is_smooth = [&](const std::string& before, const std::string& between) {
+    const Mesh mesh = import("a.obj", bent + before + "f 1 2 3 4\n" + between + "f 4 3 5 6\n");
+    EXPECT_TRUE(mesh.notes.empty());
+    EXPECT_EQ(mesh.normals[0][0], glm::vec3(0, 0, 1)) << "no other face is there";
+    return mesh.normals[0][2] == mesh.normals[2][1] && mesh.normals[0][2] != glm::vec3(0, 0, 1);
+  };
+  EXPECT_TRUE(is_smooth("", ""));
+  EXPECT_TRUE(is_smooth("s 1\n", ""));
+  EXPECT_TRUE(is_smooth("s 2\n", "s 2 # c\n"));
+  EXPECT_FALSE(is_smooth("s 1\n", "s 2\n"));
+  EXPECT_FALSE(is_smooth("", "s 2\n"));
+  EXPECT_FALSE(is_smooth("s off\n", ""));
+  EXPECT_FALSE(is_smooth("s 0\n", "s 1\n"));
+  EXPECT_TRUE(has_note(import("a.obj", bent + "s on\nf 1 2 3 4\n"), "smoothing groups that are no number"));
+}
+
 TEST_F(Obj, MaterialsWithSpacesEmissionAndWindowsPaths) {
   write("my stuff.mtl",
         "newmtl  a red \nKd 1 0 0\n newmtl lamp\nKe 3 4 5\nd 0.5\nPr 0.25\nnewmtl lamp\nKd 0 0 0\n");

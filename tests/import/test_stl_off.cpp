@@ -109,7 +109,12 @@ TEST_F(Off, ColoursOfVerticesAndFaces) {
 }
 
 TEST_F(Off, Refusals) {
-  EXPECT_EQ(refusal("a.off", "nOFF\n4\n").exit, Exit::kUnsupported);
+  const Refusal four = refusal("a.off", "nOFF\n4\n4 1 0\n");
+  EXPECT_EQ(four.exit, Exit::kUnsupported);
+  EXPECT_NE(four.message.find("of 4 dimensions; give one with three"), four.message.npos);
+  EXPECT_EQ(import("a.off", "nOFF 3\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n").triangles.size(), 1u);
+  EXPECT_EQ(import("a.off", "4nOFF\n3\n3 1 0\n0 0 0 1\n2 0 0 2\n0 1 0 1\n3 0 1 2\n").positions[1],
+            glm::vec3(1, 0, 0));
   EXPECT_EQ(refusal("a.off", "OFF\n2000000000 1 0\n0 0 0\n").exit, Exit::kInvalid);
   EXPECT_EQ(refusal("a.off", "OFF\n1 1 0\n0 0 0\n2000000000 0 0 0\n").exit, Exit::kInvalid);
   EXPECT_EQ(refusal("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n").exit, Exit::kInvalid);

@@ -40,6 +40,12 @@ TEST_F(Variants, PlyColoursOfEveryType) {
   expect_color(import("a.ply", ply(rgb("uchar"), "255 0 128")), right);
   expect_color(import("a.ply", ply(rgb("ushort"), "65535 0 32896")), right);
   expect_color(import("a.ply", ply(rgb("int"), "255 0 128")), right);
+  expect_color(import("a.ply", ply(rgb("uint"), "65535 0 32896")), right);
+  expect_color(import("a.ply", ply(rgb("uint"), "4294967295 0 2155905152")), right);
+  expect_color(import("a.ply", ply(rgb("char"), "-1 0 -128")), right);
+  const Mesh bytes = import("a.ply", ply(rgb("ushort"), "255 0 128"));
+  expect_color(bytes, right);
+  EXPECT_TRUE(has_note(bytes, "no colour of 16 bits is above 255, they are taken as bytes"));
   expect_color(import("a.ply", ply(rgb("float"), "255 0 128")), right);
   expect_color(import("a.ply", ply(rgb("float"), "1 0 0.50196")), right);
   expect_color(import("a.ply", ply(rgb("uchar", "r", "g", "b"), "255 0 128")), right);
@@ -205,6 +211,18 @@ TEST_F(Variants, OffColoursByTheirLargest) {
   EXPECT_EQ(import("a.off", two).color(1).base_color, glm::vec3(1));
 }
 
+TEST_F(Variants, FacesWithoutAColourHaveTheirVertices) {
+  std::string two = off("COFF", "255 0 0 255", " 0 255 0") + "3 0 2 1\n";
+  two.replace(two.find("3 1 0"), 5, "3 2 0");
+  const Mesh mesh = import("a.off", two);
+  EXPECT_EQ(mesh.color(0).base_color, glm::vec3(0, 1, 0));
+  EXPECT_EQ(mesh.color(1).base_color, glm::vec3(1, 0, 0));
+  ASSERT_EQ(mesh.notes.size(), 1u);
+  EXPECT_TRUE(has_note(mesh, "colours of vertices are not read where faces have their own"));
+  EXPECT_TRUE(has_note(import("a.ply", ply(rgb("uchar"), "255 0 0", rgb("uchar"), " 0 0 255")),
+                       "colours of vertices are not read where faces have their own"));
+}
+
 TEST_F(Variants, OffKeywords) {
   for (const char* keyword : {"CNOFF", "NCOFF"}) {
     const Mesh mesh = import("a.off", off(keyword, "0 0 -1 255 0 0 255"));
@@ -282,12 +300,12 @@ TEST_F(Variants, GltfExtensionsThatNoListDeclaresAreNoted) {
   document.node(
       {{"mesh", document.mesh({{"attributes", {{"POSITION", document.vec3(kTriangle)}}}, {"material", 0}})}});
   document.root["materials"] = {{{"extensions",
-                                  {{"KHR_materials_transmission", {{"transmissionFactor", 1}}},
+                                  {{"KHR_materials_sheen", {{"sheenRoughnessFactor", 1}}},
                                    {"KHR_materials_emissive_strength", json::object()}}},
                                  {"extras", {{"extensions", {{"MY_tool", 1}}}}}}};
   const Mesh mesh = import("a.gltf", document.gltf());
   EXPECT_EQ(mesh.notes.size(), 1u);
-  EXPECT_TRUE(has_note(mesh, "the extension KHR_materials_transmission is not read"));
+  EXPECT_TRUE(has_note(mesh, "the extension KHR_materials_sheen is not read"));
   document.root["materials"][0] = {{"alphaMode", "GLASS"}};
   document.root["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = {
       {"TRANSLATION", document.vec3({0, 0, 1})}, {"_COLOR", document.vec3({1, 0, 0})}};
@@ -356,6 +374,19 @@ TEST_F(Variants, StlNormalsOfZeroAskForTheTrianglesOwn) {
   }
 }
 
+TEST_F(Variants, StlNormalsThatDoNotStandOnTheirFacets) {
+  const auto facet = [&](const std::string& normal) {
+    return import("a.stl", "solid a\nfacet normal " + normal +
+                               "\nouter loop\nvertex 0 0 0\nvertex 0 1 0\nvertex 1 0 0\nendloop\nendfacet\n");
+  };
+  const Mesh along = facet("1 0 0");
+  EXPECT_EQ(along.normals[0][0], glm::vec3(0, 0, -1));
+  EXPECT_TRUE(has_note(along, "the normals of 1 facets do not stand on them"));
+  for (const char* near : {"0 0 -3", "0.1 0 -1", "nan nan nan"})
+    EXPECT_TRUE(facet(near).notes.empty()) << near;
+  EXPECT_EQ(facet("0 0 1").normals[0][0], glm::vec3(0, 0, 1)) << "which side is out, the file says";
+}
+
 TEST_F(Variants, StlWithItsBytesInTheOtherOrder) {
   std::string bytes(80, ' ');
   append(bytes, __builtin_bswap32(2));
@@ -394,6 +425,34 @@ TEST_F(Variants, MapOptionsThatChangeNothingAreNoNotes) {
   EXPECT_TRUE(mesh.notes.empty());
   write("a.mtl", "newmtl m\nmap_Kd -mm 0.2 1 red.png\n");
   EXPECT_TRUE(has_note(import("a.obj", obj), "the option -mm of a map is not read"));
+}
+
+TEST_F(Variants, MapOptionsInAnyCaseUnknownOnesAndNamesLikeThem) {
+  write("red.png", rgba_png(1, 1, {255, 0, 0, 255}));
+  write("-o.png", rgba_png(1, 1, {255, 0, 0, 255}));
+  const auto notes_of = [&](const std::string& map) {
+    write("a.mtl", "newmtl m\n" + map + "\n");
+    const Mesh mesh =
+        import("a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nusemtl m\nf 1/1 2/1 3/1\n");
+    EXPECT_EQ(mesh.color(0).base_color, glm::vec3(1, 0, 0)) << map;
+    std::string notes;
+    for (const std::string& note : mesh.notes) notes += note + "\n";
+    return notes;
+  };
+  EXPECT_EQ(notes_of("map_Kd -S 2 2 1 -O 0.5 0 0 -CLAMP off red.png"), "");
+  EXPECT_EQ(notes_of("map_Kd -o.png"), "");
+  EXPECT_EQ(notes_of("map_Kd red.png # a comment"), "");
+  EXPECT_EQ(notes_of("map_Kd \\\nred.png"), "");
+  EXPECT_NE(notes_of("map_Kd -colorspace linear red.png").find("the option -colorspace of a map is not read"),
+            std::string::npos);
+}
+
+TEST_F(Variants, MtlStatementsBeforeTheFirstMaterialAreNoted) {
+  write("a.mtl", "# a comment\nKd 1 0 0\nnewmtl m\nKd 0 1 0\n");
+  const Mesh mesh = import("a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nusemtl m\nf 1 2 3\n");
+  EXPECT_EQ(mesh.color(0).base_color, glm::vec3(0, 1, 0));
+  ASSERT_EQ(mesh.notes.size(), 1u);
+  EXPECT_TRUE(has_note(mesh, "statements before the first newmtl"));
 }
 
 TEST_F(Variants, MtlColoursBeyondTheirRangeAreCutWithANote) {

@@ -1,4 +1,4 @@
-// glTF scenes: nodes, instances, skins, materials.
+// glTF scenes: meshes as nodes, instances and skins place them.
 #include <algorithm>
 #include <bit>
 #include <limits>
@@ -6,6 +6,7 @@
 
 #include "import/gltf_materials.h"
 #include "import/gltf_primitive.h"
+#include "import/gltf_scene.h"
 #include "import/gltf_skin.h"
 #include "import/readers.h"
 #include "import/source_file.h"
@@ -13,9 +14,6 @@
 
 namespace lsp {
 namespace {
-
-// Nodes a scene may visit, shared ones counted each time: seconds, and no more.
-constexpr uint64_t kMaxVisits = 1 << 24;
 
 // Whether an instance may have the matrix. Harder to please than the runtime (lsp_instances_build), which has
 // it in single precision: another factor of two.
@@ -45,122 +43,20 @@ class GltfReader {
         path_(path),
         materials_(path_, *document_, accessors_, builder),
         primitives_(*document_, accessors_, materials_, builder),
-        skins_(*document_, accessors_) {}
+        skins_(*document_, accessors_),
+        scene_(*document_, builder) {}
 
   void read(PoseRequest& pose) {
     for (const std::string& note : document_->notes) builder_.note(document_->file + ": " + note);
     for (const std::filesystem::path& source : document_->sources) builder_.add_source(source);
     pose_document(*document_, accessors_, pose, builder_);
-    const std::vector<int> roots = find_roots();
-    check_scene(roots);
-    for (const int root : roots) walk(root);
+    const uint64_t triangles = scene_.check([this](int node) { return own_triangles(node); });
+    if (!instances_) builder_.check_count(document_->file, triangles);
+    for (const int root : scene_.roots()) walk(root);
     primitives_.note_skipped();
   }
 
  private:
-  [[noreturn]] void fail(const std::string& what) const {
-    throw Failure(Exit::kInvalid, document_->file, what + ", export it again");
-  }
-
-  const tinygltf::Node& node_at(int node) const {
-    if (node < 0 || size_t(node) >= model_.nodes.size())
-      fail("refers to node " + std::to_string(node) + ", which is not there");
-    return model_.nodes[size_t(node)];
-  }
-
-  // The default scene's nodes; without a default scene, all nodes that are no other node's child.
-  std::vector<int> find_roots() const {
-    if (model_.defaultScene >= 0) {
-      if (size_t(model_.defaultScene) >= model_.scenes.size())
-        fail("names a default scene that is not there");
-      return model_.scenes[size_t(model_.defaultScene)].nodes;
-    }
-    std::vector<bool> is_child(model_.nodes.size(), false);
-    for (const tinygltf::Node& node : model_.nodes) {
-      for (const int child : node.children) {
-        node_at(child);
-        is_child[size_t(child)] = true;
-      }
-    }
-    std::vector<int> roots;
-    for (size_t i = 0; i < model_.nodes.size(); ++i) {
-      if (!is_child[i]) roots.push_back(int(i));
-    }
-    return roots;
-  }
-
-  struct Extent {
-    uint64_t triangles = 0, visits = 0;
-  };
-
-  // Refuses cycles and scenes too large before a single matrix is multiplied. A node may have several parents
-  // (files that do so exist, against the specification), so a small file can declare a huge scene.
-  void check_scene(const std::vector<int>& roots) {
-    enum : uint8_t { kNew, kOpen, kDone };
-    std::vector<uint8_t> state(model_.nodes.size(), kNew);
-    extents_.assign(model_.nodes.size(), {});
-    Extent all;
-    size_t hidden = 0;
-    std::vector<std::pair<int, size_t>> stack;
-    for (const int root : roots) {
-      node_at(root);
-      if (state[size_t(root)] == kNew) stack.push_back({root, 0});
-      if (!stack.empty()) state[size_t(root)] = kOpen;
-      while (!stack.empty()) {
-        const int node = stack.back().first;
-        const auto& children = node_at(node).children;
-        if (stack.back().second < children.size()) {
-          const int child = children[stack.back().second++];
-          node_at(child);
-          if (state[size_t(child)] == kOpen) fail("has nodes that are their own ancestors");
-          if (state[size_t(child)] == kNew) {
-            state[size_t(child)] = kOpen;
-            stack.push_back({child, 0});
-          }
-          continue;
-        }
-        Extent& extent = extents_[size_t(node)];
-        extent.visits = 1 + children.size();
-        extent.triangles = own_triangles(node);
-        for (const int child : children) add(extent, extents_[size_t(child)]);
-        if (is_hidden(node)) hidden += extent.triangles > 0, extent = {};
-        state[size_t(node)] = kDone;
-        stack.pop_back();
-      }
-      add(all, extents_[size_t(root)]);
-    }
-    if (hidden) {
-      builder_.note(document_->file + ": " + std::to_string(hidden) +
-                    " nodes are not visible, they and what hangs below are left out");
-    }
-    size_t left_out = 0;
-    for (size_t node = 0; node < state.size(); ++node)
-      left_out += state[node] == kNew && model_.nodes[node].mesh >= 0;
-    if (left_out) {
-      builder_.note(document_->file + ": " + std::to_string(left_out) +
-                    " nodes with meshes are in no scene that is read, they are left out");
-    }
-    if (all.visits > kMaxVisits) {
-      throw Failure(Exit::kLimit, document_->file, "places more than 2^24 nodes, split the scene");
-    }
-    if (!instances_) builder_.check_count(document_->file, all.triangles);
-  }
-
-  // KHR_node_visibility.
-  bool is_hidden(int node) const {
-    const auto& extensions = model_.nodes[size_t(node)].extensions;
-    const auto found = extensions.find("KHR_node_visibility");
-    if (found == extensions.end() || !found->second.IsObject()) return false;
-    const tinygltf::Value& visible = found->second.Get("visible");
-    return visible.IsBool() && !visible.Get<bool>();
-  }
-
-  static void add(Extent& to, const Extent& more) {
-    constexpr uint64_t kFull = uint64_t{1} << 62;
-    to.triangles = std::min(kFull, to.triangles + more.triangles);
-    to.visits = std::min(kFull, to.visits + (more.triangles ? more.visits : 0));
-  }
-
   const std::vector<GltfPrimitive>& primitives(int node) {
     const tinygltf::Node& source = model_.nodes[size_t(node)];
     return primitives_.of(source.mesh, source.weights);
@@ -205,8 +101,8 @@ class GltfReader {
     while (!stack.empty()) {
       const auto [node, parent] = stack.back();
       stack.pop_back();
-      if (extents_[size_t(node)].triangles == 0) continue;
-      const tinygltf::Node& source = node_at(node);
+      if (scene_.triangles(node) == 0) continue;
+      const tinygltf::Node& source = model_.nodes[size_t(node)];
       const glm::dmat4 world = parent * gltf_matrix(source);
       if (source.mesh >= 0) place_all(node, world);
       // The stack turns the order round; children are to come in theirs.
@@ -346,7 +242,7 @@ class GltfReader {
   GltfMaterials materials_;
   GltfPrimitives primitives_;
   GltfSkins skins_;
-  std::vector<Extent> extents_;  // of each node with what hangs below it
+  GltfScene scene_;
   std::vector<glm::dvec3> placed_;
   std::vector<glm::vec3> turned_;
   std::vector<bool> mirrored_;  // per position of a skinned primitive

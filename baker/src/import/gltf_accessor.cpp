@@ -251,4 +251,11 @@ std::vector<uint32_t> GltfAccessors::indices(int index) {
   return values;
 }
 
+int gltf_components(const std::string& name, const tinygltf::Accessor& accessor) {
+  if (name == "POSITION" || name == "NORMAL") return 3;
+  if (name.starts_with("TEXCOORD_")) return 2;
+  if (name == "COLOR_0") return accessor.type == TINYGLTF_TYPE_VEC3 ? 3 : 4;
+  return 4;
+}
+
 }  // namespace lsp

@@ -39,4 +39,7 @@ class GltfAccessors {
   std::map<int, std::vector<uint8_t>> decoded_;
 };
 
+// How many numbers make a value of a vertex attribute by that name.
+int gltf_components(const std::string& name, const tinygltf::Accessor& accessor);
+
 }  // namespace lsp

@@ -2,11 +2,9 @@
 #pragma once
 
 #include <map>
-#include <tuple>
 
-#include "import/gltf_accessor.h"
-#include "import/mesh_builder.h"
-#include "import/surface_color.h"
+#include "import/gltf_numbers.h"
+#include "import/gltf_textures.h"
 
 namespace lsp {
 
@@ -20,7 +18,10 @@ class GltfMaterials {
 
   GltfMaterials(const std::filesystem::path& path, const GltfDocument& document, GltfAccessors& accessors,
                 MeshBuilder& builder)
-      : path_(path), document_(document), accessors_(accessors), builder_(builder) {}
+      : document_(document),
+        builder_(builder),
+        numbers_(document.file, builder),
+        textures_(path, document, accessors, builder) {}
 
   // Made on first use; where the document has none by that number, glTF's default (white, a rough metal).
   const Entry& at(uint32_t index);
@@ -30,28 +31,19 @@ class GltfMaterials {
 
  private:
   Entry read(const nlohmann::json& source, uint32_t known_id);
-  TextureUse texture(const nlohmann::json& info, const AlphaRule& rule);
-  int64_t image_at(const nlohmann::json& info);
-  std::shared_ptr<Texture> picture(int64_t image, const AlphaRule& rule);
-  Picture read_picture(int64_t image);
-  std::string picture_bytes(const nlohmann::json& image);
   void mean_roughness(const nlohmann::json& info, Material& material);
-  // As their namesakes of json_member.h, with a note where something else is there.
-  double number(const nlohmann::json& parent, const char* key, double fallback);
-  template <typename T>
-  void numbers(const nlohmann::json& parent, const char* key, size_t count, T* values);
+  const nlohmann::json* read_glossy(const nlohmann::json& glossy, float (&factor)[4], Material& material);
+  AlphaRule alpha_rule(const nlohmann::json& source, float factor);
+  float glass_share(const nlohmann::json& transmission, const Material& material);
   void note_unread_textures(const nlohmann::json& source);
   void note(const std::string& text) { builder_.note(document_.file + ": " + text); }
 
-  const std::filesystem::path& path_;
   const GltfDocument& document_;
-  GltfAccessors& accessors_;
   MeshBuilder& builder_;
+  const GltfNumbers numbers_;
+  GltfTextures textures_;
   std::map<uint32_t, Entry> materials_;
-  std::map<uint32_t, uint32_t> ids_;         // what materials_ held before it was forgotten, too
-  std::map<int64_t, glm::dvec2> roughness_;  // means of pictures: roughness and metalness
-  std::map<std::tuple<int64_t, AlphaMode, float, float>, std::shared_ptr<Texture>> pictures_;
-  uint64_t charged_ = 0;
+  std::map<uint32_t, uint32_t> ids_;  // what materials_ held before it was forgotten, too
 };
 
 }  // namespace lsp

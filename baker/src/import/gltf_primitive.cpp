@@ -64,20 +64,15 @@ void drop_unused(GltfPrimitive& primitive) {
   gather(primitive.weights, primitive.joints_each);
 }
 
-// The number of an attribute in Draco's data, -1 where it is not in there.
-int draco_id(const tinygltf::Value& extension, const std::string& name) {
-  if (!extension.IsObject() || !extension.Get("attributes").IsObject()) return -1;
-  const tinygltf::Value& value = extension.Get("attributes").Get(name);
-  return value.IsInt() ? value.Get<int>() : -1;
-}
-
 }  // namespace
 
 GltfPrimitives::GltfPrimitives(const GltfDocument& document, GltfAccessors& accessors,
                                GltfMaterials& materials, MeshBuilder& builder)
-    : document_(document), accessors_(accessors), materials_(materials), builder_(builder) {
-  decode_all_draco();
-}
+    : document_(document),
+      accessors_(accessors),
+      materials_(materials),
+      builder_(builder),
+      draco_(document, accessors, builder) {}
 
 void GltfPrimitives::fail(const std::string& what) const {
   throw Failure(Exit::kInvalid, document_.file, what + ", export it again");
@@ -123,14 +118,6 @@ void GltfPrimitives::note_skipped() {
   }
 }
 
-// How many numbers make a value. Throws Failure kInvalid where glTF does not permit that.
-int GltfPrimitives::components_of(const std::string& name, int accessor) const {
-  if (name == "POSITION" || name == "NORMAL") return 3;
-  if (name.starts_with("TEXCOORD_")) return 2;
-  if (name == "COLOR_0") return accessors_.at(accessor).type == TINYGLTF_TYPE_VEC3 ? 3 : 4;
-  return 4;
-}
-
 GltfPrimitive GltfPrimitives::read(const tinygltf::Primitive& source, int mode,
                                    const std::vector<double>& weights) {
   GltfPrimitive out;
@@ -148,10 +135,10 @@ GltfPrimitive GltfPrimitives::read(const tinygltf::Primitive& source, int mode,
     out.normals.clear();
   }
   read_joints(source, out);
-  const auto decoded = decoded_.find(&source);
+  const GltfDraco::Decoded* decoded = draco_.find(source);
   const auto indices = source.attributes.find(kGltfIndices);
-  if (decoded != decoded_.end()) {
-    out.indices = decoded->second.indices;
+  if (decoded) {
+    out.indices = decoded->indices;
   } else {
     std::vector<uint32_t> vertices;
     if (indices != source.attributes.end()) {
@@ -168,7 +155,7 @@ GltfPrimitive GltfPrimitives::read(const tinygltf::Primitive& source, int mode,
     out.indices = expand(std::move(vertices), mode);
   }
   read_colors(source, weights, out);
-  if (decoded != decoded_.end() && source.targets.empty()) decoded_.erase(decoded);  // it is not read again
+  if (source.targets.empty()) draco_.forget(source);  // it is not read again
   if (out.positions.size() > out.indices.size()) drop_unused(out);
   return out;
 }
@@ -178,13 +165,12 @@ GltfPrimitives::Values GltfPrimitives::read_values(const tinygltf::Primitive& so
   Values out;
   const auto found = source.attributes.find(name);
   if (found == source.attributes.end()) return out;
-  out.components = components ? components : components_of(name, found->second);
-  const auto decoded = decoded_.find(&source);
-  if (decoded != decoded_.end() && decoded->second.values.contains(name)) {
-    out.floats = decoded->second.values.at(name);
+  out.components = components ? components : gltf_components(name, accessors_.at(found->second));
+  const GltfDraco::Decoded* decoded = draco_.find(source);
+  if (decoded && decoded->values.contains(name)) {
+    out.floats = decoded->values.at(name);
     accessors_.overlay_sparse(accessors_.at(found->second), out.components, out.floats);
-  } else if (decoded == decoded_.end() || accessors_.at(found->second).bufferView >= 0 ||
-             draco_id(source.extensions.at("KHR_draco_mesh_compression"), name) < 0) {
+  } else if (!decoded || accessors_.at(found->second).bufferView >= 0 || !GltfDraco::names(source, name)) {
     out.floats = accessors_.floats(found->second, out.components);
   }
   if (name == "COLOR_0") normalize_color(accessors_.at(found->second), out);
@@ -208,7 +194,8 @@ void GltfPrimitives::morph(const tinygltf::Primitive& source, const std::string&
   for (size_t i = 0; i < std::min(source.targets.size(), weights.size()); ++i) {
     const auto target = source.targets[i].find(name);
     if (target == source.targets[i].end() || weights[i] == 0 || !std::isfinite(weights[i])) continue;
-    const std::vector<float> moves = accessors_.floats(target->second, components_of(name, target->second));
+    const std::vector<float> moves =
+        accessors_.floats(target->second, gltf_components(name, accessors_.at(target->second)));
     if (moves.size() != values.floats.size()) fail("has a morph target of another size than what it moves");
     for (size_t k = 0; k < moves.size(); ++k)
       values.floats[k] = float(double(values.floats[k]) + weights[i] * double(moves[k]));
@@ -308,58 +295,6 @@ void GltfPrimitives::read_joints(const tinygltf::Primitive& source, GltfPrimitiv
       }
     }
   }
-}
-
-// Draco's primitives of all meshes that nodes place, decoded in one go.
-void GltfPrimitives::decode_all_draco() {
-  const tinygltf::Model& model = document_.model;
-  std::vector<bool> placed(model.meshes.size(), false);
-  for (const tinygltf::Node& node : model.nodes) {
-    if (node.mesh >= 0 && size_t(node.mesh) < placed.size()) placed[size_t(node.mesh)] = true;
-  }
-  std::vector<DracoJob> jobs;
-  std::vector<const tinygltf::Primitive*> sources;
-  std::vector<std::vector<std::string>> names;
-  for (size_t mesh = 0; mesh < placed.size(); ++mesh) {
-    if (!placed[mesh]) continue;
-    for (const tinygltf::Primitive& source : model.meshes[mesh].primitives) {
-      if (!source.extensions.contains("KHR_draco_mesh_compression") ||
-          !source.attributes.contains("POSITION"))
-        continue;
-      jobs.push_back(draco_job(source, names.emplace_back()));
-      sources.push_back(&source);
-    }
-  }
-  if (jobs.empty()) return;
-  std::vector<DracoMesh> meshes = decode_draco_fenced(document_.file, jobs, builder_.budget());
-  for (size_t i = 0; i < sources.size(); ++i) {
-    Decoded& decoded = decoded_[sources[i]];
-    decoded.indices = std::move(meshes[i].indices);
-    for (size_t k = 0; k < names[i].size(); ++k) {
-      if (meshes[i].values[k].empty()) {
-        builder_.note(document_.file + ": the compressed attribute " + names[i][k] + " cannot be read");
-      } else {
-        decoded.values[names[i][k]] = std::move(meshes[i].values[k]);
-      }
-    }
-  }
-}
-
-DracoJob GltfPrimitives::draco_job(const tinygltf::Primitive& source, std::vector<std::string>& names) {
-  const tinygltf::Value& extension = source.extensions.at("KHR_draco_mesh_compression");
-  const auto id = [&](const std::string& name) { return draco_id(extension, name); };
-  const tinygltf::Value none;
-  const tinygltf::Value& view = extension.IsObject() ? extension.Get("bufferView") : none;
-  if (!view.IsInt() || id("POSITION") < 0)
-    fail("has KHR_draco_mesh_compression without a buffer view or positions");
-  DracoJob job{accessors_.view(view.Get<int>()), {}};
-  for (const auto& [name, accessor] : source.attributes) {
-    if (name == kGltfIndices || id(name) < 0) continue;
-    job.attributes.push_back({id(name), components_of(name, accessor), accessors_.at(accessor).normalized,
-                              name == "POSITION" || name == "NORMAL"});
-    names.push_back(name);
-  }
-  return job;
 }
 
 }  // namespace lsp

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "import/gltf_accessor.h"
-#include "import/gltf_draco.h"
+#include "import/gltf_draco_primitives.h"
 #include "import/gltf_materials.h"
 #include "import/mesh_builder.h"
 
@@ -54,9 +54,6 @@ class GltfPrimitives {
   void read_joints(const tinygltf::Primitive& source, GltfPrimitive& out);
   void morph(const tinygltf::Primitive& source, const std::string& name, const std::vector<double>& weights,
              Values& values);
-  int components_of(const std::string& name, int accessor) const;
-  DracoJob draco_job(const tinygltf::Primitive& source, std::vector<std::string>& names);
-  void decode_all_draco();
   [[noreturn]] void fail(const std::string& what) const;
 
   const GltfDocument& document_;
@@ -64,12 +61,7 @@ class GltfPrimitives {
   GltfMaterials& materials_;
   MeshBuilder& builder_;
   std::map<std::pair<int, std::vector<double>>, std::vector<GltfPrimitive>> meshes_;
-  // Decoded compressed primitives: their indices and attributes by name.
-  struct Decoded {
-    std::vector<uint32_t> indices;
-    std::map<std::string, std::vector<float>> values;
-  };
-  std::map<const tinygltf::Primitive*, Decoded> decoded_;
+  GltfDraco draco_;
   uint64_t skipped_modes_ = 0, without_positions_ = 0;
 };
 

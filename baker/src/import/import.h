@@ -34,7 +34,7 @@ struct ImportOptions {
 //
 // Winding follows the file; a node that mirrors flips it, so that it still agrees with the normals.
 // Normals: the file's where they are usable; elsewhere flat for glTF (as its specification says) and
-// angle-weighted within the crease angle over equal positions for the other formats.
+// angle-weighted within the crease angle over equal positions, and an OBJ's smoothing groups, for the others.
 // Positions are welded exactly (-0 equals +0); positions no kept triangle uses are left out.
 //
 // The files may be hostile: every count, offset and index is checked before use, and memory is bounded.

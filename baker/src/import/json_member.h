@@ -15,6 +15,12 @@ inline const nlohmann::json& member(const nlohmann::json& parent, const char* ke
   return at != parent.end() ? *at : kNull;
 }
 
+// An element of an array, null where there is none by that number.
+inline const nlohmann::json& element(const nlohmann::json& list, int64_t index) {
+  static const nlohmann::json kNull;
+  return list.is_array() && index >= 0 && uint64_t(index) < list.size() ? list[size_t(index)] : kNull;
+}
+
 // A whole number of 0 or more, or `fallback` for anything else.
 inline int64_t index_member(const nlohmann::json& parent, const char* key, int64_t fallback = -1) {
   const nlohmann::json& value = member(parent, key);

@@ -76,6 +76,7 @@ void MeshBuilder::begin(const std::string& file, std::span<const glm::dvec3> pos
   missing_ = missing;
   group_begin_ = mesh_.triangles.size();
   unsmooth_.clear();
+  smoothing_.clear();
   unusable_normals_ = 0;
   welded_.assign(positions.size(), kNoIndex);
   // Many small groups must not each move the whole mesh.
@@ -91,7 +92,7 @@ void MeshBuilder::begin(const std::string& file, std::span<const glm::dvec3> pos
 }
 
 void MeshBuilder::add(const glm::uvec3& corners, const glm::vec3* normals, uint32_t material,
-                      const TriangleColor* color) {
+                      const TriangleColor* color, uint32_t smoothing) {
   const auto primitive = uint32_t(mesh_.primitive_count++);
   const size_t count = positions_.size();
   if (corners.x >= count || corners.y >= count || corners.z >= count) {
@@ -135,12 +136,17 @@ void MeshBuilder::add(const glm::uvec3& corners, const glm::vec3* normals, uint3
         direction = geometric_normal(a, b, c);
       }
       unit[i] = glm::vec3(direction);
-    } else if (missing_ == MissingNormals::kFlat) {
+    } else if (missing_ == MissingNormals::kFlat || smoothing == kFlatGroup) {
       unit[i] = glm::vec3(geometric_normal(a, b, c));
     } else {
       unit[i] = glm::vec3(std::numeric_limits<float>::quiet_NaN());
       complete = false;
     }
+  }
+  if (smoothing != kNoGroup || !smoothing_.empty()) {
+    while (smoothing_.size() < mesh_.triangles.size() - group_begin_)
+      budget_.push_back(file_, smoothing_, kNoGroup);
+    budget_.push_back(file_, smoothing_, smoothing);
   }
   if (!complete) unsmooth_.push_back(uint32_t(mesh_.triangles.size()));
   mesh_.triangles.push_back(indices);
@@ -168,7 +174,8 @@ void MeshBuilder::end() {
     note(file_ + ": " + std::to_string(unusable_normals_) +
          " corner normals are zero or not finite, the triangle's own takes their place");
   }
-  budget_.release(positions_.size() * sizeof(uint32_t));
+  budget_.release(positions_.size() * sizeof(uint32_t) + smoothing_.capacity() * sizeof(uint32_t));
+  smoothing_ = {};
   positions_ = {};
 }
 
@@ -199,15 +206,16 @@ void MeshBuilder::grow_slots() {
 }
 
 // Angle-weighted normals (Thuermer and Wuethrich 1998): a corner's normal is the sum of the normals of the
-// faces around its position, each by its angle there, over those within the crease angle of its own face.
+// faces around its position, each by its angle there, over those of its smoothing group within the crease
+// angle of its own face.
 void MeshBuilder::smooth_missing() {
   struct Corner {
     glm::vec3 face_normal;
     float angle;
   };
   const size_t first = group_begin_, count = mesh_.triangles.size() - first;
-  const uint64_t temporary =
-      count * 3 * (sizeof(Corner) + sizeof(uint32_t)) + (exact_.size() + 1) * sizeof(uint32_t);
+  const uint64_t temporary = count * 3 * (sizeof(Corner) + (smoothing_.empty() ? 1 : 2) * sizeof(uint32_t)) +
+                             (exact_.size() + 1) * sizeof(uint32_t);
   budget_.charge(file_, temporary);
 
   // Corners sorted by position: those of position p are by_position[begins[p] .. begins[p + 1]).
@@ -217,6 +225,7 @@ void MeshBuilder::smooth_missing() {
   }
   for (size_t p = 1; p < begins.size(); ++p) begins[p] += begins[p - 1];
   std::vector<Corner> by_position(count * 3);
+  std::vector<uint32_t> groups(smoothing_.empty() ? 0 : count * 3);  // of the corners by position
   std::vector<uint32_t> place(count * 3);
   {
     std::vector<uint32_t> next(begins.begin(), begins.end() - 1);
@@ -230,6 +239,7 @@ void MeshBuilder::smooth_missing() {
         const double sine = std::sqrt(glm::dot(glm::cross(u, v), glm::cross(u, v)));
         place[3 * t + i] = next[triangle[i]]++;
         by_position[place[3 * t + i]] = {normal, float(std::atan2(sine, glm::dot(u, v)))};
+        if (!groups.empty()) groups[place[3 * t + i]] = smoothing_[t];
       }
     }
   }
@@ -240,7 +250,8 @@ void MeshBuilder::smooth_missing() {
       glm::vec3& normal = mesh_.normals[t][i];
       if (!std::isnan(normal.x)) continue;
       const uint32_t p = mesh_.triangles[t][i];
-      const glm::vec3 own = by_position[place[3 * (t - first) + i]].face_normal;
+      const uint32_t own_place = place[3 * (t - first) + i];
+      const glm::vec3 own = by_position[own_place].face_normal;
       normal = own;
       if (begins[p + 1] - begins[p] > kMaxSmoothValence) {
         ++too_many;
@@ -249,6 +260,7 @@ void MeshBuilder::smooth_missing() {
       glm::dvec3 sum(0);
       for (uint32_t k = begins[p]; k < begins[p + 1]; ++k) {
         const Corner& corner = by_position[k];
+        if (!groups.empty() && groups[k] != groups[own_place]) continue;
         if (glm::dot(corner.face_normal, own) >= crease_cosine_)
           sum += glm::dvec3(corner.face_normal) * double(corner.angle);
       }

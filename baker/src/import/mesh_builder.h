@@ -23,6 +23,10 @@ enum class MissingNormals {
   kSmooth,  // angle-weighted over the faces around an equal position, up to the crease angle
 };
 
+// Triangles of different smoothing groups share no normals; these are all of one, and those of kFlatGroup
+// each of its own.
+inline constexpr uint32_t kNoGroup = 0, kFlatGroup = 0xFFFFFFFFu;
+
 class MeshBuilder {
  public:
   MeshBuilder(Budget& budget, float crease_angle_degrees);
@@ -40,7 +44,7 @@ class MeshBuilder {
   // any length, NaN where the file has none; null where it has none for all three. `color` is its own; null:
   // the material's.
   void add(const glm::uvec3& corners, const glm::vec3* normals, uint32_t material,
-           const TriangleColor* color = nullptr);
+           const TriangleColor* color = nullptr, uint32_t smoothing = kNoGroup);
 
   // Ends the group; corners still without a normal get one.
   void end();
@@ -79,11 +83,12 @@ class MeshBuilder {
   std::span<const glm::dvec3> positions_;
   std::vector<glm::dvec3> exact_;  // mesh_.positions before they are rounded
   MissingNormals missing_ = MissingNormals::kFlat;
-  std::vector<uint32_t> welded_;    // per position of the group: its index in the mesh, or kNoIndex
-  std::vector<uint32_t> slots_;     // open addressing over exact_
-  size_t group_begin_ = 0;          // first kept triangle of the group
-  std::vector<uint32_t> unsmooth_;  // kept triangles of the group with a corner without a normal
-  uint64_t unusable_normals_ = 0;   // of the group: present but zero or not finite
+  std::vector<uint32_t> welded_;     // per position of the group: its index in the mesh, or kNoIndex
+  std::vector<uint32_t> slots_;      // open addressing over exact_
+  size_t group_begin_ = 0;           // first kept triangle of the group
+  std::vector<uint32_t> unsmooth_;   // kept triangles of the group with a corner without a normal
+  std::vector<uint32_t> smoothing_;  // groups of the kept triangles of the group; empty: all kNoGroup
+  uint64_t unusable_normals_ = 0;    // of the group: present but zero or not finite
 };
 
 }  // namespace lsp

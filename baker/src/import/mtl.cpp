@@ -9,6 +9,8 @@
 namespace lsp {
 namespace {
 
+constexpr size_t kLongestWord = 32;  // that a note repeats
+
 // "r g b", or one number for all three. False, with the colour as it was, for anything else: spectral curves
 // and CIE colours ("spectral f.rfl", "xyz x y z").
 bool read_color(std::string_view line, glm::vec3& color) {
@@ -36,8 +38,9 @@ bool read_factor(std::string_view line, float& factor, std::set<std::string>& no
 
 // Whether numbers of an option that is not read are those that change nothing.
 bool says_nothing(std::string_view option, const glm::dvec2& values) {
-  if (option == "-mm") return values == glm::dvec2(0, 1);
-  return option == "-texres" || values == (option == "-bm" ? glm::dvec2(1, 0) : glm::dvec2(0));
+  if (equals_ignoring_case(option, "-mm")) return values == glm::dvec2(0, 1);
+  return equals_ignoring_case(option, "-texres") ||
+         values == (equals_ignoring_case(option, "-bm") ? glm::dvec2(1, 0) : glm::dvec2(0));
 }
 
 // "-option values... file name", which may hold spaces. Numbers end an option's values: -o, -s and -t take
@@ -57,23 +60,28 @@ MtlMap read_map(std::string_view line, std::set<std::string>& notes) {
   while (true) {
     std::string_view ahead = line, option, value;
     if (!take_word(ahead, option) || option.size() < 2 || option[0] != '-' ||
-        (option[1] >= '0' && option[1] <= '9'))
-      break;
+        (option[1] >= '0' && option[1] <= '9') || trim(ahead).empty())
+      break;  // a file's name may begin so, too
     line = ahead;
-    if (option == "-o") {
+    const auto is = [&](std::string_view name) { return equals_ignoring_case(option, name); };
+    if (is("-o")) {
       take_numbers(3, map.offset);
-    } else if (option == "-s") {
+    } else if (is("-s")) {
       take_numbers(3, map.scale);
-    } else if (option == "-t" || option == "-mm" || option == "-bm" || option == "-boost" ||
-               option == "-texres") {
-      glm::dvec2 values(0, option == "-mm" ? 1 : 0);
-      take_numbers(option == "-t" ? 3 : option == "-mm" ? 2 : 1, values);
+    } else if (is("-t") || is("-mm") || is("-bm") || is("-boost") || is("-texres")) {
+      glm::dvec2 values(0, is("-mm") ? 1 : 0);
+      take_numbers(is("-t") ? 3 : is("-mm") ? 2 : 1, values);
       if (!says_nothing(option, values))
         notes.insert("the option " + std::string(option) + " of a map is not read");
-    } else if (take_word(line, value)) {  // -clamp, -imfchan, -blendu, -blendv, -cc, -type
-      if (option == "-clamp") map.clamp = value == "on";
-      if (option == "-imfchan" && !value.empty()) map.channel = value[0];
-      if (option == "-cc" && value == "on") notes.insert("the option -cc of a map is not read");
+    } else if (take_word(line, value)) {
+      if (is("-clamp")) {
+        map.clamp = equals_ignoring_case(value, "on");
+      } else if (is("-imfchan")) {
+        map.channel = value[0];
+      } else if (is("-cc") ? equals_ignoring_case(value, "on")
+                           : !is("-blendu") && !is("-blendv") && !is("-type")) {
+        notes.insert("the option " + std::string(option.substr(0, kLongestWord)) + " of a map is not read");
+      }
     }
   }
   map.file = std::string(unquoted(trim(line)));
@@ -125,8 +133,15 @@ void read_mtl(const std::filesystem::path& path, Budget& budget,
     settle("Kd", color_given, entry->color, entry->material.base_color);
     settle("Ke", emission_given, entry->emission, entry->material.emission);
   };
-  while (take_line(rest, line)) {
+  std::string joined;
+  bool named = false;
+  while (take_joined_line(rest, line, joined)) {
     if (!take_word(line, word)) continue;
+    if (!named && !word.starts_with('#') && !equals_ignoring_case(word, "newmtl")) {
+      notes.insert("statements before the first newmtl are of no material and not read");
+      continue;
+    }
+    named = named || !word.starts_with('#');
     const auto is = [&](std::string_view keyword) { return equals_ignoring_case(word, keyword); };
     if (is("newmtl")) {
       end_material();
@@ -167,8 +182,8 @@ void read_mtl(const std::filesystem::path& path, Budget& budget,
                word == "disp" || word == "decal" || word == "refl") {
       notes.insert(std::string(word) + " is not read");
     } else if (!says_no_color(word) && says_something(word, line)) {
-      constexpr size_t kLongest = 32, kMostNotes = 100;
-      if (notes.size() < kMostNotes) notes.insert(std::string(word.substr(0, kLongest)) + " is not read");
+      constexpr size_t kMostNotes = 100;
+      if (notes.size() < kMostNotes) notes.insert(std::string(word.substr(0, kLongestWord)) + " is not read");
     }
   }
   end_material();

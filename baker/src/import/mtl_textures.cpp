@@ -4,6 +4,7 @@
 
 #include "import/find_file.h"
 #include "import/source_file.h"
+#include "import/text.h"
 #include "lsp/program.h"
 
 namespace lsp {
@@ -94,6 +95,10 @@ Picture MtlTextures::read(const MtlMaterial& source, const MtlMap& map) {
   std::string why = "is not there";
   bool guessed = false;
   std::filesystem::path path = find_file(source.folder, map.file, guessed);
+  // A comment may stand behind it, but names hold '#', too.
+  const std::string uncommented = map.file.substr(0, map.file.find(" #"));
+  if (path.empty() && uncommented != map.file)
+    path = find_file(source.folder, std::string(unquoted(trim(uncommented))), guessed);
   if (const auto folder = std::filesystem::path(file_).parent_path();
       path.empty() && folder != source.folder) {
     path = find_file(folder, map.file, guessed);  // some exporters name what lies beside the mesh
@@ -106,6 +111,7 @@ Picture MtlTextures::read(const MtlMaterial& source, const MtlMap& map) {
     picture = decode_picture(file_, bytes, builder_.budget(), why);
     builder_.budget().release(bytes.size());
   }
+  if (picture.turned) builder_.note(file_ + ": the picture " + map.file + kTurned);
   if (picture.rgba.empty())
     builder_.note(file_ + ": the picture " + map.file + " " + why + "; factors hold without it");
   return picture;

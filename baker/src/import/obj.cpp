@@ -29,18 +29,7 @@ class ObjReader {
     const std::string text = read_text(path_, builder_.budget());
     std::string_view rest = text, line;
     std::string joined;
-    while (take_line(rest, line)) {
-      if (goes_on(line) && !is_comment(line)) {
-        joined.clear();
-        do {
-          joined.append(line.substr(0, line.rfind('\\')));
-          joined += ' ';
-        } while (take_line(rest, line) && goes_on(line));
-        if (!goes_on(line)) joined.append(line);
-        line = joined;
-      }
-      read_line(line);
-    }
+    while (take_joined_line(rest, line, joined)) read_line(line);
     if (soup_.positions.size() >= kNoIndex) {
       throw Failure(Exit::kLimit, file_, "holds more than 2^32 - 2 vertices, split the mesh");
     }
@@ -50,17 +39,13 @@ class ObjReader {
       builder_.note(file_ + ": " + std::to_string(other_elements_) +
                     " lines, points, curves or surfaces hold no triangle");
     }
+    note_lost_references();
     use_polypaint();
     soup_.make_colors_linear();
     add_polygons(file_, soup_, builder_);
   }
 
  private:
-  // Blanks behind the backslash are a slip that exporters' wrapping makes.
-  static bool goes_on(std::string_view line) { return trim(line).ends_with('\\'); }
-  // One may end in a backslash, as folders' names do, and never goes on.
-  static bool is_comment(std::string_view line) { return trim(line).starts_with('#'); }
-
   void read_line(std::string_view line) {
     std::string_view word;
     if (!take_word(line, word)) return;
@@ -71,11 +56,13 @@ class ObjReader {
       push(soup_.normals, glm::vec3(read_vector(line)));
     } else if (word == "vt") {
       const glm::dvec3 at = read_vector(line);
-      push(soup_.texcoords, glm::dvec2(at.x, std::isnan(at.y) ? 0.0 : 1 - at.y));
+      push(soup_.texcoords, glm::dvec2(at.x, std::isnan(at.y) ? 1.0 : 1 - at.y));
     } else if (word == "f" || word == "fo") {
       read_face(line);
     } else if (word == "usemtl") {
       use_material(trim(line));
+    } else if (word == "s") {
+      use_smoothing(line);
     } else if (word == "mtllib") {
       builder_.budget().charge(file_, line.size() + 128);
       libraries_.emplace_back(trim(line));
@@ -91,10 +78,10 @@ class ObjReader {
 
   // Names, groups and what curves and surfaces, which are counted, are made of.
   static bool says_no_surface(std::string_view word) {
-    constexpr std::string_view kWords[] = {
-        "o",      "g",    "s",        "mg",       "vp",         "deg",       "bmat",  "step",
-        "cstype", "parm", "trim",     "hole",     "scrv",       "sp",        "end",   "con",
-        "bevel",  "lod",  "c_interp", "d_interp", "shadow_obj", "trace_obj", "ctech", "stech"};
+    constexpr std::string_view kWords[] = {"o",        "g",          "mg",        "vp",    "deg",  "bmat",
+                                           "step",     "cstype",     "parm",      "trim",  "hole", "scrv",
+                                           "sp",       "end",        "con",       "bevel", "lod",  "c_interp",
+                                           "d_interp", "shadow_obj", "trace_obj", "ctech", "stech"};
     return std::find(std::begin(kWords), std::end(kWords), word) != std::end(kWords);
   }
 
@@ -156,7 +143,22 @@ class ObjReader {
     for (const std::string& word : unknown_words_) words += (words.empty() ? "" : ", ") + word;
     if (!words.empty()) builder_.note(file_ + ": lines that begin with " + words + " are not read");
     if (const std::string odd = numbers_.note(); !odd.empty()) builder_.note(file_ + ": " + odd);
+    if (unread_groups_)
+      builder_.note(file_ + ": smoothing groups that are no number and not off are not read");
     if (values_left_) builder_.note(file_ + ": weights and alpha of vertices are not read");
+  }
+
+  // Normals and texture coordinates may stand below the faces that refer to them.
+  void note_lost_references() {
+    const auto lost = [](const std::vector<uint32_t>& corners, size_t count) {
+      return std::any_of(corners.begin(), corners.end(),
+                         [&](uint32_t i) { return i != kNoIndex && i >= count; });
+    };
+    if (bad_normals_ || lost(soup_.corner_normals, soup_.normals.size()))
+      builder_.note(file_ +
+                    ": faces refer to normals that are not there, they are made as where none are given");
+    if (bad_texcoords_ || lost(soup_.corner_texcoords, soup_.texcoords.size()))
+      builder_.note(file_ + ": faces refer to texture coordinates that are not there");
   }
 
   // Colours that stand with the vertices themselves win.
@@ -185,8 +187,12 @@ class ObjReader {
       uint32_t normal = kNoIndex, texcoord = kNoIndex;
       if (slash != word.npos) {
         const size_t second = word.find('/', slash + 1);
-        texcoord = resolve(word.substr(slash + 1, second - slash - 1), soup_.texcoords.size());
-        if (second != word.npos) normal = resolve(word.substr(second + 1), soup_.normals.size());
+        const std::string_view of_texture = word.substr(slash + 1, second - slash - 1);
+        const std::string_view of_normal = second == word.npos ? "" : word.substr(second + 1);
+        texcoord = resolve(of_texture, soup_.texcoords.size());
+        normal = resolve(of_normal, soup_.normals.size());
+        bad_texcoords_ = bad_texcoords_ || (texcoord == kNoIndex && !of_texture.empty());
+        bad_normals_ = bad_normals_ || (normal == kNoIndex && !of_normal.empty());
       }
       if (texcoord != kNoIndex || !soup_.corner_texcoords.empty()) {
         while (soup_.corner_texcoords.size() + 1 < soup_.corners.size())
@@ -198,7 +204,11 @@ class ObjReader {
         push(soup_.corner_normals, normal);
       }
     }
-    if (soup_.end_face(file_, builder_.budget())) push(soup_.materials, material_);
+    if (!soup_.end_face(file_, builder_.budget())) return;
+    push(soup_.materials, material_);
+    if (smoothing_ == kNoGroup) return;
+    while (soup_.smoothing.size() + 1 < soup_.face_ends.size()) push(soup_.smoothing, kNoGroup);
+    push(soup_.smoothing, smoothing_);
   }
 
   void use_material(std::string_view name) {
@@ -208,6 +218,19 @@ class ObjReader {
       used_.push_back(at->first);
     }
     material_ = at->second;
+  }
+
+  // "s 3", or "s off" and "s 0" for faces that are flat.
+  void use_smoothing(std::string_view line) {
+    std::string_view word;
+    int64_t group = 0;
+    if (!take_word(line, word)) return;
+    const bool off = equals_ignoring_case(word, "off");
+    if (!off && !(integer_of(word, group) && group >= 0 && group < int64_t{kFlatGroup})) {
+      unread_groups_ = true;
+      return;
+    }
+    smoothing_ = group == 0 ? kFlatGroup : uint32_t(group);
   }
 
   // Reads the library `name`, if there is a file by that name.
@@ -287,9 +310,12 @@ class ObjReader {
   std::map<std::string, uint32_t> names_{{std::string(kDefaultMaterial), 0}};
   std::vector<std::string> used_{std::string(kDefaultMaterial)};  // names, by the number in soup_.materials
   uint32_t material_ = 0;
+  uint32_t smoothing_ = kNoGroup;
+  bool unread_groups_ = false;
   std::vector<std::string> libraries_;
   size_t libraries_tried_ = 0;
   uint64_t other_elements_ = 0;
+  bool bad_normals_ = false, bad_texcoords_ = false;  // a number of one that cannot be
   std::set<std::string> unknown_words_;
   NumberReader numbers_;
   bool values_left_ = false;          // behind the coordinates or colours of vertices

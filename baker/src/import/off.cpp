@@ -1,5 +1,5 @@
-// Geomview's OFF: [ST][C][N][4]OFF as text; what is binary goes on in off_binary.cpp. Texture coordinates are
-// skipped.
+// Geomview's OFF: [ST][C][N][4][n]OFF, of three dimensions, as text; what is binary goes on in
+// off_binary.cpp. Texture coordinates are skipped.
 #include <algorithm>
 #include <cmath>
 
@@ -123,9 +123,7 @@ class OffReader {
     keyword_.has_normals = take("N");
     keyword_.has_colors = take("C") || keyword_.has_colors;  // NCOFF occurs, its values in the order of CNOFF
     keyword_.homogeneous = take("4");
-    if (take("n")) {
-      throw Failure(Exit::kUnsupported, file_, "is an nOFF file, of any dimension; give one with three");
-    }
+    const bool any_dimension = take("n");
     if (!take("OFF") && !take("off")) {
       // The keyword may be left out; the counts then come first.
       int64_t number = 0;
@@ -137,9 +135,17 @@ class OffReader {
     words_.put_back(first);  // "OFF8 6 12" occurs
     Words ahead = words_;
     std::string_view next;
-    if (!first.empty() || !ahead.next(next) || !equals_ignoring_case(next, "BINARY")) return false;
-    words_ = ahead;
-    return true;
+    const bool binary = first.empty() && ahead.next(next) && equals_ignoring_case(next, "BINARY");
+    if (any_dimension && binary)
+      throw Failure(Exit::kUnsupported, file_, "is a binary nOFF file; give one as text, or an OFF file");
+    if (any_dimension) {
+      if (const uint64_t dimensions = read_count("dimensions"); dimensions != 3)
+        throw Failure(
+            Exit::kUnsupported, file_,
+            "is an nOFF file of " + std::to_string(dimensions) + " dimensions; give one with three");
+    }
+    if (binary) words_ = ahead;
+    return binary;
   }
 
   void read_vertex() {

@@ -69,9 +69,33 @@ Picture decode_webp(const std::string& file, std::string_view bytes, Budget& bud
 struct JpegFrame {
   size_t begin = 0;  // behind the marker of its start; 0: it is no JPEG
   int components = 0;
-  bool adobe = false;  // a marker of Adobe's says what they are
-  bool usable = true;  // no table has more codes than a byte can count
+  bool adobe = false;   // a marker of Adobe's says what they are
+  bool usable = true;   // no table has more codes than a byte can count
+  bool turned = false;  // EXIF says that it is to be shown turned or mirrored
 };
+
+// What EXIF's first directory says of the picture's orientation, 1 where it says nothing. `tiff` begins with
+// the order of its bytes.
+uint32_t exif_orientation(std::string_view tiff) {
+  constexpr size_t kEntryBytes = 12;
+  constexpr uint32_t kOrientation = 0x0112;
+  const bool big = tiff.starts_with("MM");
+  const auto number = [&](size_t at, size_t bytes) {
+    uint32_t value = 0;
+    for (size_t i = 0; i < bytes; ++i) {
+      const size_t from = at + (big ? i : bytes - 1 - i);
+      value = value << 8 | (from < tiff.size() ? uint8_t(tiff[from]) : 0u);
+    }
+    return value;
+  };
+  if (!big && !tiff.starts_with("II")) return 1;
+  const size_t directory = number(4, 4), count = number(directory, 2);
+  for (size_t i = 0; i < count && directory + 2 + (i + 1) * kEntryBytes <= tiff.size(); ++i) {
+    const size_t entry = directory + 2 + i * kEntryBytes;
+    if (number(entry, 2) == kOrientation) return number(entry + 8, 2);
+  }
+  return 1;
+}
 
 // Whether the tables of codes in `length` bytes have at most 256 each: stb_image 2.27 writes what is beyond
 // over what lies behind them. It reads a table to its end, even where the length ends before.
@@ -106,6 +130,11 @@ JpegFrame jpeg_frame(std::string_view bytes) {
     const std::string_view rest = bytes.substr(at + 4);
     if (marker >= 0xC0 && marker <= 0xC2 && rest.size() > 5) frame.components = uint8_t(rest[5]);
     if (marker == 0xEE && rest.starts_with("Adobe")) frame.adobe = true;
+    constexpr std::string_view kExif("Exif\0\0", 6);
+    if (marker == 0xE1 && rest.starts_with(kExif) && length > 2 + kExif.size()) {
+      const uint32_t orientation = exif_orientation(rest.substr(kExif.size(), length - 2 - kExif.size()));
+      frame.turned = orientation > 1 && orientation <= 8;
+    }
     if (marker == 0xC4 && !usable_tables(rest, int64_t(length) - 2)) frame.usable = false;
     at += 2 + length;
   }
@@ -152,6 +181,9 @@ Picture decode_stb(const std::string& file, std::string_view bytes, Budget& budg
   const auto* data = reinterpret_cast<const stbi_uc*>(bytes.data());
   int width = 0, height = 0, channels = 0;
   bytes_left = uint64_t{1} << 20;
+  // What Xcode makes of PNG has blue first and is multiplied by its alpha.
+  stbi_convert_iphone_png_to_rgb(1);
+  stbi_set_unpremultiply_on_load(1);
   why = "is of no format known here, or damaged";
   if (bytes.size() > 0x7FFFFFFF ||
       !stbi_info_from_memory(data, int(bytes.size()), &width, &height, &channels))
@@ -205,6 +237,7 @@ Picture decode_picture(const std::string& file, std::string_view bytes, Budget& 
   Picture picture = webp ? decode_webp(file, bytes, budget, why) : decode_stb(file, bytes, budget, why);
   for (size_t i = 3; i < picture.rgba.size() && !picture.has_alpha; i += 4)
     picture.has_alpha = picture.rgba[i] != 255;
+  picture.turned = frame.turned;
   return picture;
 }
 

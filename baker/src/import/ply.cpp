@@ -44,6 +44,8 @@ class PlyReader {
       }
     }
     note_unread_bytes();
+    if (largest_short_ > 0 && largest_short_ <= 255)
+      builder_.note(file_ + ": no colour of 16 bits is above 255, they are taken as bytes");
     if (translucent_) builder_.note(file_ + ": alpha of vertices or faces is not read, all count as solid");
     soup_.material = builder_.default_material();
     use_textures(header.textures);
@@ -100,10 +102,10 @@ class PlyReader {
     }
   }
 
-  // Where the properties of an element's colour are: their places, and what makes them 0 to 1.
+  // Where the properties of an element's colour are: their places, and what they are at their largest.
   struct ColorProperties {
     int places[4] = {-1, -1, -1, -1};
-    double scale = 1;
+    double unit = 1;
     bool there() const { return places[0] >= 0 && places[1] >= 0 && places[2] >= 0; }
     // Which component a property is, -1 for none.
     int component(size_t property) const {
@@ -125,16 +127,23 @@ class PlyReader {
         if (!named || element.properties[k].is_list || out.places[i] >= 0) continue;
         out.places[i] = int(k);
         const Type type = element.properties[k].type;
-        if (type != Type::kFloat32 && type != Type::kFloat64) out.scale = type == Type::kUint16 ? 65535 : 255;
+        if (type != Type::kFloat32 && type != Type::kFloat64) out.unit = 255;
       }
     }
     return out;
   }
 
-  // What was read of a colour, as a part of `scale`.
-  glm::vec3 scaled_color(const glm::dvec4& color, double scale) {
-    translucent_ = translucent_ || color.a < scale;
-    return glm::vec3(glm::dvec3(color) / scale);
+  // A component of a colour. Bytes above 127 are negative where the header calls them signed.
+  double color_value(const Property& property) {
+    const double value = body_.number(property.type);
+    if (property.type == Type::kUint16) largest_short_ = std::max(largest_short_, value);
+    return property.type == Type::kInt8 && value < 0 ? value + 256 : value;
+  }
+
+  glm::vec3 color_of(const glm::dvec4& color, double unit) {
+    const bool solid = color.a == unit || color.a == 255 || color.a == 65535 || color.a == 4294967295.0;
+    translucent_ = translucent_ || !solid;
+    return glm::vec3(glm::dvec3(color));
   }
 
   // Names the properties of an element that `is_read` does not say are read.
@@ -184,6 +193,7 @@ class PlyReader {
     }
     note_unread(element, [&](size_t k) { return targets[k] >= 0; });
     const bool placed = holds_texcoords(element);
+    soup_.color_unit = std::max(soup_.color_unit, color.unit);
     if (element.count > 0 && (seen & 7) != 7) fail(file_, "has vertices without x, y and z");
     if (element.count >= kNoIndex - soup_.positions.size()) {
       throw Failure(Exit::kLimit, file_, "holds more than 2^32 - 2 vertices, split the mesh");
@@ -195,12 +205,14 @@ class PlyReader {
     if (has_normals_) soup_.normals.reserve(soup_.normals.size() + element.count);
     const size_t count = element.properties.size();
     for (uint64_t i = 0; i < element.count; ++i) {
-      double values[12] = {0, 0, 0, 0, 0, 0, 0, 0, 0, color.scale, 0, 0};
+      double values[12] = {0, 0, 0, 0, 0, 0, 0, 0, 0, color.unit, 0, 0};
       for (size_t k = 0; k < count; ++k) {
         if (targets[k] < 0) {
           body_.skip(element.properties[k]);
         } else {
-          values[targets[k]] = body_.number(element.properties[k].type);
+          const bool of_color = targets[k] >= 6 && targets[k] < 10;
+          values[targets[k]] =
+              of_color ? color_value(element.properties[k]) : body_.number(element.properties[k].type);
         }
       }
       body_.end_element();
@@ -212,7 +224,7 @@ class PlyReader {
       }
       if (!color.there()) continue;
       soup_.colors.resize(soup_.positions.size() - 1, kNoColor);
-      soup_.colors.push_back(scaled_color({values[6], values[7], values[8], values[9]}, color.scale));
+      soup_.colors.push_back(color_of({values[6], values[7], values[8], values[9]}, color.unit));
     }
   }
 
@@ -243,17 +255,18 @@ class PlyReader {
     note_unread(element, [&](size_t k) { return properties.holds(k); });
     if (properties.corners == element.properties.size()) return skip(element);
     const ColorProperties& color = properties.color;
+    soup_.face_color_unit = std::max(soup_.face_color_unit, color.unit);
     std::vector<uint32_t> strip;
     std::vector<double> texcoords;
     for (uint64_t i = 0; i < element.count; ++i) {
-      glm::dvec4 rgba(0, 0, 0, color.scale);
+      glm::dvec4 rgba(0, 0, 0, color.unit);
       const size_t first = soup_.corners.size();
       uint32_t texture = 0;
       texcoords.clear();
       for (size_t k = 0; k < element.properties.size(); ++k) {
         const Property& property = element.properties[k];
         if (const int component = color.component(k); color.there() && component >= 0) {
-          rgba[component] = body_.number(property.type);
+          rgba[component] = color_value(property);
         } else if (k == properties.corners) {
           read_corners(property, strips, strip);
         } else if (k == properties.texcoords) {
@@ -278,7 +291,7 @@ class PlyReader {
       }
       if (!color.there()) continue;
       soup_.face_colors.resize(std::min(soup_.face_colors.size(), soup_.face_ends.size()));
-      const glm::vec3 own = scaled_color(rgba, color.scale);
+      const glm::vec3 own = color_of(rgba, color.unit);
       while (soup_.face_colors.size() < soup_.face_ends.size()) push(soup_.face_colors, own);
     }
   }
@@ -383,6 +396,7 @@ class PlyReader {
   PolygonSoup soup_;
   bool has_normals_ = false;
   bool translucent_ = false;
+  double largest_short_ = 0;      // of colours of 16 bits
   bool textured_ = false;         // comments name textures
   bool vertices_placed_ = false;  // texture coordinates are the vertices'
 };

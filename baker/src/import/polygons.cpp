@@ -71,19 +71,22 @@ bool PolygonSoup::end_face(const std::string& file, Budget& budget) {
 }
 
 void PolygonSoup::make_colors_linear() {
-  for (std::vector<glm::vec3>* list : {&colors, &face_colors}) {
+  const std::pair<std::vector<glm::vec3>*, double> lists[] = {{&colors, color_unit},
+                                                              {&face_colors, face_color_unit}};
+  for (const auto& [list, unit] : lists) {
     float largest = 0;
     for (const glm::vec3& color : *list) {
       for (int i = 0; i < 3; ++i) largest = std::isfinite(color[i]) ? std::max(largest, color[i]) : largest;
     }
-    constexpr float kMostOvershoot = 2;  // filters and tools that mix colours end a little above 1
-    const double scale = largest > kMostOvershoot ? 255 : 1;
-    colors_cut = colors_cut || double(largest) > scale;
+    constexpr double kMostOvershoot = 2;  // filters and tools that mix colours end a little above 1
+    double scale = unit;
+    for (const double larger : {255.0, 65535.0, 4294967295.0}) {
+      if (double(largest) > kMostOvershoot * scale) scale = std::max(scale, larger);
+    }
+    colors_cut = colors_cut || double(largest) > double(float(scale));
     for (glm::vec3& color : *list) {
-      for (int i = 0; i < 3; ++i) {
-        const double value = std::isfinite(color[i]) ? std::clamp(double(color[i]) / scale, 0.0, 1.0) : 1.0;
-        color[i] = float(linear_of_srgb(value));
-      }
+      for (int i = 0; i < 3; ++i)
+        color[i] = float(linear_of_srgb(std::clamp(double(color[i]) / scale, 0.0, 1.0)));
     }
   }
 }
@@ -160,6 +163,15 @@ bool has_place(const PolygonSoup& soup, uint32_t corner) {
   return uv < soup.texcoords.size() && std::isfinite(soup.texcoords[uv].x + soup.texcoords[uv].y);
 }
 
+// The face's colour, else the vertex's, else white.
+glm::vec3 color_of(const PolygonSoup& soup, uint32_t face, uint32_t vertex) {
+  const auto given = [](const std::vector<glm::vec3>& list, uint32_t i) {
+    return i < list.size() && std::isfinite(list[i].x + list[i].y + list[i].z);
+  };
+  if (given(soup.face_colors, face)) return soup.face_colors[face];
+  return given(soup.colors, vertex) ? soup.colors[vertex] : glm::vec3(1);
+}
+
 // A colour for each piece.
 std::vector<TriangleColor> piece_colors(const std::string& file, const PolygonSoup& soup,
                                         std::span<const Piece> pieces, MeshBuilder& builder) {
@@ -190,10 +202,7 @@ std::vector<TriangleColor> piece_colors(const std::string& file, const PolygonSo
                 has_place(soup, corner) ? soup.texcoords[soup.corner_texcoords[corner]] : glm::dvec2(0);
             out[i].base_uv = surface.base.place(at);
             out[i].glow_uv = surface.glow.place(at);
-            out[i].color = glm::vec4(1);
-            if (soup.corners[corner] < soup.colors.size())
-              out[i].color = {soup.colors[soup.corners[corner]], 1};
-            if (piece.face < soup.face_colors.size()) out[i].color = {soup.face_colors[piece.face], 1};
+            out[i].color = {color_of(soup, piece.face, soup.corners[corner]), 1};
           }
         });
     for (size_t i = 0; i < list.size(); ++i) colors[list[i]] = own[i];
@@ -219,7 +228,8 @@ void add_polygons(const std::string& file, const PolygonSoup& soup, MeshBuilder&
       normals[i] = normal < soup.normals.size() ? soup.normals[normal]
                                                 : glm::vec3(std::numeric_limits<float>::quiet_NaN());
     }
-    builder.add(triangle, normals, material_of(soup, piece.face), color);
+    const uint32_t smoothing = piece.face < soup.smoothing.size() ? soup.smoothing[piece.face] : kNoGroup;
+    builder.add(triangle, normals, material_of(soup, piece.face), color, smoothing);
   };
   if (soup.has_colors()) {
     builder.budget().charge(file, soup.triangle_count(),
@@ -237,6 +247,8 @@ void add_polygons(const std::string& file, const PolygonSoup& soup, MeshBuilder&
     builder.note(file + ": its " + std::to_string(soup.positions.size()) +
                  " vertices have no faces, they are a cloud of points");
   }
+  if (!soup.colors.empty() && !soup.face_colors.empty())
+    builder.note(file + ": colours of vertices are not read where faces have their own");
   if (soup.colors_cut) builder.note(file + ": colours above 1 are cut to it");
   if (soup.too_small) {
     builder.note(file + ": " + std::to_string(soup.too_small) +

@@ -26,21 +26,24 @@ struct PolygonSoup {
   std::vector<uint32_t> face_ends;       // one past the face's last corner
   std::vector<uint32_t> materials;       // per face; empty: all `material`
   uint32_t material = 0;
+  std::vector<uint32_t> smoothing;  // groups per face; those beyond its end are of kNoGroup
   // What gives triangles colours of their own; all empty where nothing does.
-  std::vector<glm::dvec2> texcoords;       // their origin at the picture's upper left
-  std::vector<uint32_t> corner_texcoords;  // into texcoords (kNoIndex: none); empty or as long as corners
-  std::vector<glm::vec3> colors;           // per position; linear once make_colors_linear() was called
-  std::vector<glm::vec3> face_colors;      // per face, likewise
-  std::map<uint32_t, Surface> surfaces;    // of materials with textures
-  bool colors_cut = false;                 // by make_colors_linear()
-  uint64_t too_small = 0;                  // faces with fewer than three corners, not in the lists
+  std::vector<glm::dvec2> texcoords;           // their origin at the picture's upper left
+  std::vector<uint32_t> corner_texcoords;      // into texcoords (kNoIndex: none); empty or as long as corners
+  std::vector<glm::vec3> colors;               // per position; linear once make_colors_linear() was called
+  std::vector<glm::vec3> face_colors;          // per face, likewise
+  std::map<uint32_t, Surface> surfaces;        // of materials with textures
+  double color_unit = 1, face_color_unit = 1;  // what such a value is at its largest, or more
+  bool colors_cut = false;                     // by make_colors_linear()
+  uint64_t too_small = 0;                      // faces with fewer than three corners, not in the lists
 
   // Ends a face whose corners were appended since the last one. One with fewer than three is dropped and
   // counted: it holds no triangle. True where it was kept.
   bool end_face(const std::string& file, Budget& budget);
   uint64_t triangle_count() const;
-  // Colours, as files give them, are on the sRGB curve: from 0 to 255 where any is above 2, else from 0 to 1,
-  // and what is a little above is cut. What is no number (kNoColor) becomes white.
+  // Colours, as files give them, are on the sRGB curve: from 0 to their unit, or to 255, 65,535 or 2^32 - 1
+  // where any is above twice what is less, and what is a little above is cut. What is no number (kNoColor)
+  // stays so: the vertex's colour holds for a face, white for a vertex.
   void make_colors_linear();
   bool has_colors() const { return !colors.empty() || !face_colors.empty() || !surfaces.empty(); }
 };

@@ -228,8 +228,11 @@ void read_ascii(const std::string& file, std::string_view text, PolygonSoup& sou
   }
 }
 
-// A normal of zero length asks for the triangle's own; many programs write no other.
-void fill_normals(PolygonSoup& soup) {
+// A normal of zero length asks for the triangle's own; many programs write no other, and some write one for
+// all. One that points to the wrong side is left.
+void fill_normals(const std::string& file, PolygonSoup& soup, MeshBuilder& builder) {
+  constexpr double kLeast = 0.9;  // the cosine to the triangle's own: what rounding does to slivers stays
+  uint64_t wrong = 0;
   size_t begin = 0;
   for (const uint32_t end : soup.face_ends) {
     const uint32_t normal = soup.corner_normals[begin];
@@ -238,10 +241,18 @@ void fill_normals(PolygonSoup& soup) {
     glm::dvec3 area(0);
     for (size_t i = begin + 2; i < end; ++i) area += glm::cross(at(i - 1) - origin, at(i) - origin);
     const double largest = std::max(std::abs(area.x), std::max(std::abs(area.y), std::abs(area.z)));
-    if (normal != kNoIndex && soup.normals[normal] == glm::vec3(0) && largest > 0 && std::isfinite(largest))
-      soup.normals[normal] = glm::vec3(area / largest);
+    if (normal != kNoIndex && largest > 0 && std::isfinite(largest)) {
+      const glm::dvec3 own = area / largest, given(soup.normals[normal]);
+      const double lengths = glm::length(own) * glm::length(given);
+      const bool differs = std::isfinite(lengths) && !(std::abs(glm::dot(own, given)) >= kLeast * lengths);
+      wrong += differs;
+      if (differs || lengths == 0) soup.normals[normal] = glm::vec3(own);
+    }
     begin = end;
   }
+  if (wrong)
+    builder.note(file + ": the normals of " + std::to_string(wrong) +
+                 " facets do not stand on them, the facets' own take their place");
 }
 
 }  // namespace
@@ -267,7 +278,7 @@ void read_stl(const std::filesystem::path& path, MeshBuilder& builder) {
     throw Failure(Exit::kInvalid, file,
                   "is no STL file, neither text nor long enough for a header: export it again");
   }
-  fill_normals(soup);
+  fill_normals(file, soup, builder);
   add_polygons(file, soup, builder);
 }
 

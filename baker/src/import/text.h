@@ -37,6 +37,23 @@ inline bool take_line(std::string_view& text, std::string_view& line) {
   return true;
 }
 
+// The same for a line that goes on where it ends in a backslash, as those of OBJ and its .mtl do; blanks
+// behind that are a slip of exporters' wrapping. `joined` holds such a line. Comments, which may end in a
+// backslash as folders' names do, never go on.
+inline bool take_joined_line(std::string_view& text, std::string_view& line, std::string& joined) {
+  const auto goes_on = [](std::string_view part) { return trim(part).ends_with('\\'); };
+  if (!take_line(text, line)) return false;
+  if (!goes_on(line) || trim(line).starts_with('#')) return true;
+  joined.clear();
+  do {
+    joined.append(line.substr(0, line.rfind('\\')));
+    joined += ' ';
+  } while (take_line(text, line) && goes_on(line));
+  if (!goes_on(line)) joined.append(line);
+  line = joined;
+  return true;
+}
+
 // Takes the next word off a line. False where none is left.
 inline bool take_word(std::string_view& line, std::string_view& word) {
   size_t begin = 0;

@@ -16,11 +16,15 @@ struct AlphaRule {
   AlphaMode mode = AlphaMode::kOpaque;
   float factor = 1;
   float cutoff = 0.5f;
+  float glass = 0;  // the share of what is there that light passes, whatever alpha says
 
   float coverage(float alpha) const {
-    if (mode == AlphaMode::kOpaque) return 1;
     const float product = std::min(std::max(alpha * factor, 0.0f), 1.0f);
-    return mode == AlphaMode::kBlend ? product : product >= cutoff ? 1.0f : 0.0f;
+    const float there = mode == AlphaMode::kOpaque  ? 1.0f
+                        : mode == AlphaMode::kBlend ? product
+                        : product >= cutoff         ? 1.0f
+                                                    : 0.0f;
+    return there * (1 - glass);
   }
   auto operator<=>(const AlphaRule&) const = default;
 };
