@@ -34,9 +34,6 @@ namespace lsp {
 namespace HWY_NAMESPACE {
 namespace {
 
-namespace hn = hwy::HWY_NAMESPACE;
-using namespace subset;
-
 // The text of single rays.
 struct Text {
 #define LSP_WIDE
