@@ -95,17 +95,6 @@ struct Tracer : Rays<kPool> {
                set_u(scene.header->entry_word_count)},
         calls(scene, rays, any_hit) {}
 
-  template <size_t kMost>
-  static HWY_INLINE V3 load_3(const float (&from)[3][kMost], size_t i) {
-    return {load(from[0] + i), load(from[1] + i), load(from[2] + i)};
-  }
-  template <size_t kMost>
-  static HWY_INLINE void store_3(const V3& v, float (&to)[3][kMost], size_t i) {
-    store(v.x, to[0] + i);
-    store(v.y, to[1] + i);
-    store(v.z, to[2] + i);
-  }
-
   void end(uint32_t number, uint32_t flags) {
     hits[number] = Text::lsp_no_hit();
     hits[number].flags = flags;
@@ -553,7 +542,7 @@ struct Tracer : Rays<kPool> {
   void compact() {
     const Bits called = exact | in_part;
     if (const auto more = static_cast<size_t>(std::popcount(called)); calls.size() + more > Calls::kMost)
-      trace_calls(std::min(Calls::kMost - more, kKept));
+      trace_calls(std::min(size_t{Calls::kMost} - more, kKept));
     size_t at = 0;
     for (size_t i = 0; i < n; i += kLanes) {
       const Bits calling = lanes_of(called, i);

@@ -19,41 +19,9 @@ namespace lsp {
 namespace HWY_NAMESPACE {
 namespace {
 
-// Rays under way, a value a lane: where they have come.
-template <size_t kMost>
-struct Rays {
-  template <typename T>
-  using Of = T[kMost + kLanes];
-  Of<uint32_t> ray_, step_, doubt_;
-  Of<float> origin_[3], direction_[3], inverse_[3], tmin_, tmax_, t_, t_last_;
-  Of<int32_t> cell_[3], axis_;
-
-  // Those of `from`'s lanes at i that are set, to `at` and on.
-  template <size_t kFrom>
-  HWY_NOINLINE void take(const Rays<kFrom>& from, size_t i, Bits lanes, size_t at) {
-    const Mover move(i, at, lanes);
-    for (size_t k = 0; k < 3; ++k) {
-      move(from.origin_[k], origin_[k]);
-      move(from.direction_[k], direction_[k]);
-      move(from.inverse_[k], inverse_[k]);
-      move(from.cell_[k], cell_[k]);
-    }
-    move(from.tmin_, tmin_);
-    move(from.tmax_, tmax_);
-    move(from.t_, t_);
-    move(from.t_last_, t_last_);
-    move(from.axis_, axis_);
-    move(from.ray_, ray_);
-    move(from.step_, step_);
-    move(from.doubt_, doubt_);
-  }
-};
-
 class Calls {
  public:
-  static constexpr size_t kMost = 64;
-
-  size_t size() const { return n_; }
+  static constexpr uint32_t kMost = 64;
 
   Calls(const lsp_scene& scene, const LspRay* rays, bool any_hit)
       : scene_(scene),
@@ -63,6 +31,9 @@ class Calls {
         partial_((scene.header->required_features & LSP_FEATURE_COVERAGE) != 0) {
     for (uint32_t& mark : stack_[0]) mark = LSP_CELL_NO_CHILD;
   }
+
+  // Under way.
+  size_t size() const { return n_; }
 
   // Of rays' lanes at i, where they go on if nothing is hit, those that are set are to be traced exactly in
   // the filled cell of that number and corner (in cells), which they enter at t_in. begin() is to follow.
@@ -142,8 +113,7 @@ class Calls {
     store(hn::Zero(df), u_ + i);
     store(hn::Zero(df), v_ + i);
 
-    const V3 o = {hn::BitCast(df, record[0]), hn::BitCast(df, record[1]), hn::BitCast(df, record[2])};
-    const V3 d = {hn::BitCast(df, record[4]), hn::BitCast(df, record[5]), hn::BitCast(df, record[6])};
+    const V3 o = floats(record), d = floats(record + 4);
     const V3 size = {hn::Abs(d.x), hn::Abs(d.y), hn::Abs(d.z)};
     const V3 direction = scale(d).direction;
     const VF beyond = hn::Div(set(grid_.margin), hn::Sqrt(dot(direction, direction)));
@@ -183,15 +153,6 @@ class Calls {
   // lsp_rotate.
   static HWY_INLINE V3 rotated(const V3& v, MF at_x, MF at_y) {
     return {along({v.y, v.z, v.x}, at_x, at_y), along({v.z, v.x, v.y}, at_x, at_y), along(v, at_x, at_y)};
-  }
-  static HWY_INLINE V3 load_3(const Of<float> (&from)[3], size_t i) {
-    return {load(from[0] + i), load(from[1] + i), load(from[2] + i)};
-  }
-
-  static HWY_INLINE void store_3(const V3& v, Of<float> (&to)[3], size_t i) {
-    store(v.x, to[0] + i);
-    store(v.y, to[1] + i);
-    store(v.z, to[2] + i);
   }
 
   // A byte of each lane, as a number.
@@ -242,19 +203,17 @@ class Calls {
     const VU child_0 = hn::And(node[3], set_u(0xFFFF)), child_1 = hn::ShiftRight<16>(node[3]);
     const VU top = load(top_ + i), number = load(number_ + i), below = hn::Sub(top, set_u(1));
     // Read before it is written: what has been written last would be waited for.
-    const VU popped = load_words(&stack_[0][0], hn::Add(hn::Mul(below, set_u(kRow)), number), none);
+    const VU popped = load_words(&stack_[0][0], hn::Add(hn::Mul(below, set_u(kMost)), number), none);
     // What is not to wait goes to a row of its own.
     const VU row = select(both, top, set_u(LSP_CELL_STACK));
     hn::ScatterIndex(select(is_0_nearer, child_1, child_0), du, &stack_[0][0],
-                     hn::BitCast(di, hn::Add(hn::Mul(row, set_u(kRow)), number_in(both, number))));
+                     hn::BitCast(di, hn::Add(hn::Mul(row, set_u(kMost)), hn::IfThenElseZero(both, number))));
     const VU next = select(none, popped, select(is_0_nearer, child_0, child_1));
     store(select(at_node, next, ref), ref_ + i);
     const VU pushed = hn::Min(hn::Add(top, set_u(1)), set_u(LSP_CELL_STACK - 1));
     store(select(both, pushed, select(none, hn::Max(below, set_u(1)), top)), top_ + i);
     store(select(at_node, hn::Add(step, set_u(1)), step), step_ + i);
   }
-  // Of lanes that are not set 0.
-  static HWY_INLINE VU number_in(MU these, VU number) { return hn::IfThenElseZero(these, number); }
 
   // Tests a triangle of those that are at a leaf, unless more of the others could be. Those that are over are
   // returned.
@@ -302,20 +261,17 @@ class Calls {
     const VU axis = load(axis_ + i);
     const MF at_x = as_float(hn::Eq(axis, hn::Zero(du))), at_y = as_float(hn::Eq(axis, set_u(1)));
     const V3 origin = load_3(origin_, i), shear = load_3(shear_, i);
-    const auto corner = [&](const VU(&r)[4]) HWY_ATTR {
-      const V3 p = {hn::BitCast(df, r[0]), hn::BitCast(df, r[1]), hn::BitCast(df, r[2])};
-      return minus(rotated(p, at_x, at_y), origin);
-    };
+    const auto corner = [&](const VU* r) HWY_ATTR { return minus(rotated(floats(r), at_x, at_y), origin); };
     const V3 a = corner(record[0]), b = corner(record[1]), c = corner(record[2]);
     const Passages<DF> passes = pass<DF>(a, b, c, shear.x, shear.y);
     const MF met = hn::And(as_float(at_leaf), passes.met);
     if (bits_of(met) != 0) keep(i, met, a, b, c, shear.z, passes, number, record[0][3]);
 
-    const MU is_last = hn::Lt(hn::And(ref, set_u(3u << LSP_CELL_LEAF_COUNT_SHIFT)), set_u(1));
+    const MU is_last = hn::Eq(hn::And(ref, set_u(3u << LSP_CELL_LEAF_COUNT_SHIFT)), hn::Zero(du));
     const VU top = load(top_ + i), below = hn::Sub(top, set_u(1));
     const MU pops = hn::And(at_leaf, is_last);
     const VU popped =
-        load_words(&stack_[0][0], hn::Add(hn::Mul(below, set_u(kRow)), load(number_ + i)), pops);
+        load_words(&stack_[0][0], hn::Add(hn::Mul(below, set_u(kMost)), load(number_ + i)), pops);
     VU next = select(is_last, popped, hn::Sub(ref, set_u((1u << LSP_CELL_LEAF_COUNT_SHIFT) - 1)));
     if (any_hit_)
       next = select(hn::And(is_last, hn::Ne(load(triangle_ + i), set_u(LSP_NONE))), set_u(LSP_CELL_NO_CHILD),
@@ -383,8 +339,6 @@ class Calls {
     n_ = at;
   }
 
-  static constexpr uint32_t kRow = kMost;
-
   const lsp_scene& scene_;
   const LspCellGrid& grid_;
   const LspRay* rays_;
@@ -401,7 +355,7 @@ class Calls {
   Of<uint32_t> triangle_, primitive_;
   Of<uint32_t> next_;  // the triangle that is tested next; LSP_NONE: it is not known
   Of<uint32_t> ref_, top_, step_, node_first_, max_steps_, reference_first_, axis_, number_;
-  uint32_t stack_[LSP_CELL_STACK + 1][kRow];  // by a call's number; what never waits goes to the last row
+  uint32_t stack_[LSP_CELL_STACK + 1][kMost];  // by a call's number; what never waits goes to the last row
 };
 
 }  // namespace

@@ -17,10 +17,6 @@ namespace lsp {
 namespace HWY_NAMESPACE {
 namespace {
 
-HWY_INLINE V3 floats(const VU* words) {
-  return {hn::BitCast(df, words[0]), hn::BitCast(df, words[1]), hn::BitCast(df, words[2])};
-}
-
 // Scaled by a power of two first, as there.
 HWY_INLINE V3 unit_of(const V3& n) {
   const VU stated = hn::ShiftRight<23>(hn::BitCast(du, largest(n)));

@@ -83,6 +83,36 @@ class Mover {
   decltype(hn::IndicesFromVec(du, VI())) of_u_;
 };
 
+// Rays under way, a value a lane: where they have come.
+template <size_t kMost>
+struct Rays {
+  template <typename T>
+  using Of = T[kMost + kLanes];
+  Of<uint32_t> ray_, step_, doubt_;
+  Of<float> origin_[3], direction_[3], inverse_[3], tmin_, tmax_, t_, t_last_;
+  Of<int32_t> cell_[3], axis_;
+
+  // Those of `from`'s lanes at i that are set, to `at` and on.
+  template <size_t kFrom>
+  HWY_NOINLINE void take(const Rays<kFrom>& from, size_t i, Bits lanes, size_t at) {
+    const Mover move(i, at, lanes);
+    for (size_t k = 0; k < 3; ++k) {
+      move(from.origin_[k], origin_[k]);
+      move(from.direction_[k], direction_[k]);
+      move(from.inverse_[k], inverse_[k]);
+      move(from.cell_[k], cell_[k]);
+    }
+    move(from.tmin_, tmin_);
+    move(from.tmax_, tmax_);
+    move(from.t_, t_);
+    move(from.t_last_, t_last_);
+    move(from.axis_, axis_);
+    move(from.ray_, ray_);
+    move(from.step_, step_);
+    move(from.doubt_, doubt_);
+  }
+};
+
 // floor(q > 0 ? q : 0), held below n: lsp_cell_patch.
 HWY_INLINE VF patch_of(VF q, VF n) {
   const VF i = hn::Floor(hn::IfThenElseZero(hn::Gt(q, hn::Zero(df)), q));

@@ -96,6 +96,20 @@ HWY_INLINE Scaled scale(const V3& d) {
       {no_trifle(hn::Mul(d.x, shrink)), no_trifle(hn::Mul(d.y, shrink)), no_trifle(hn::Mul(d.z, shrink))}};
 }
 
+// A point or vector a lane, of three arrays.
+template <size_t kCount>
+HWY_INLINE V3 load_3(const float (&from)[3][kCount], size_t i) {
+  return {load(from[0] + i), load(from[1] + i), load(from[2] + i)};
+}
+template <size_t kCount>
+HWY_INLINE void store_3(const V3& v, float (&to)[3][kCount], size_t i) {
+  store(v.x, to[0] + i);
+  store(v.y, to[1] + i);
+  store(v.z, to[2] + i);
+}
+HWY_INLINE V3 floats(const VU* words) {
+  return {hn::BitCast(df, words[0]), hn::BitCast(df, words[1]), hn::BitCast(df, words[2])};
+}
 HWY_INLINE VF along(const V3& v, MF is_x, MF is_y) { return select(is_x, v.x, select(is_y, v.y, v.z)); }
 // An array of the scene; one that is empty has a zero element, which is what is read beyond the end of any.
 template <typename T>
