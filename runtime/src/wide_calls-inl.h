@@ -283,7 +283,7 @@ class Calls {
   // Of the triangles that rays pass through those that are nearer than what they have.
   HWY_INLINE void keep(size_t i, MF met, const V3& a, const V3& b, const V3& c, VF shear_z,
                        const Passages<DF>& passes, VU number, VU primitive) {
-    const VF t = plane_depth<DF>(load_3(direction_, i), shear_z, a, b, c), best = load(t_ + i);
+    const VF t = plane_depth<DF>(load_3(direction_, i), shear_z, a, b, c, passes), best = load(t_ + i);
     const MF before = as_float(hn::Lt(primitive, load(primitive_ + i)));
     const MF nearer = hn::Or(hn::Lt(t, best), hn::And(hn::Eq(t, best), before));
     MF kept = hn::And(met, hn::And(hn::Gt(t, load(tmin_ + i)), nearer));

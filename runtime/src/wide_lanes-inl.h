@@ -42,6 +42,7 @@ struct Text {
 #include "lsp/traverse.h"
 #undef LSP_CELLS
 };
+static_assert(kEdgeOn == LSP_EDGE_ON);
 
 // Rays of a round, a bit of a word each.
 constexpr size_t kPool = 64;

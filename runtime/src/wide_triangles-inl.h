@@ -84,14 +84,80 @@ HWY_INLINE hn::Vec<D> dot(const Points<D>& a, const Points<D>& b) {
   return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));
 }
 template <class D>
+HWY_INLINE hn::Vec<D> least(const Points<D>& a) {
+  return min_of(min_of(a.x, a.y), a.z);
+}
+template <class D>
+HWY_INLINE hn::Vec<D> greatest(const Points<D>& a) {
+  return max_of(max_of(a.x, a.y), a.z);
+}
+template <class D>
 HWY_INLINE hn::Vec<D> largest(const Points<D>& a) {
   return max_of(max_of(hn::Abs(a.x), hn::Abs(a.y)), hn::Abs(a.z));
 }
 
-// lsp_plane_depth.
+// Lines of rays, and triangles that they pass through: lsp_triangle up to the determinant.
+template <class D>
+struct Passages {
+  Points<D> x, y;  // the corners', seen along the ray
+  hn::Vec<D> v, w, det;
+  hn::Mask<D> met;
+};
+template <class D>
+HWY_INLINE Passages<D> pass(const Points<D>& a, const Points<D>& b, const Points<D>& c, hn::Vec<D> shear_x,
+                            hn::Vec<D> shear_y) {
+  using V = hn::Vec<D>;
+  using M = hn::Mask<D>;
+  const D d;
+  const auto seen = [&](V i, V shear, V z) HWY_ATTR { return hn::Sub(i, hn::Mul(shear, z)); };
+  const Points<D> x = {seen(a.x, shear_x, a.z), seen(b.x, shear_x, b.z), seen(c.x, shear_x, c.z)};
+  const Points<D> y = {seen(a.y, shear_y, a.z), seen(b.y, shear_y, b.z), seen(c.y, shear_y, c.z)};
+  const V u = hn::Sub(hn::Mul(x.z, y.y), hn::Mul(y.z, x.y));
+  const V v = hn::Sub(hn::Mul(x.x, y.z), hn::Mul(y.x, x.z));
+  const V w = hn::Sub(hn::Mul(x.y, y.x), hn::Mul(y.y, x.x));
+  const V zero = hn::Zero(d), det = hn::Add(hn::Add(u, v), w);
+  // Of a NaN among them the determinant is one.
+  const M below = hn::Lt(hn::Min(hn::Min(u, v), w), zero), above = hn::Gt(hn::Max(hn::Max(u, v), w), zero);
+  // Finite and not zero; no number is neither less.
+  const M sound = hn::And(hn::Lt(hn::Abs(det), hn::Set(d, HUGE_VALF)), hn::Gt(hn::Abs(det), zero));
+  const auto beside = [&](const Points<D>& p)
+                          HWY_ATTR { return hn::Or(hn::Gt(least(p), zero), hn::Lt(greatest(p), zero)); };
+  const M outside = hn::Or(hn::And(below, above), hn::Or(beside(x), beside(y)));
+  return {x, y, v, w, det, hn::AndNot(outside, sound)};
+}
+
+// lsp_crossings, held between lo and hi.
+template <class D>
+HWY_INLINE void narrow(hn::Vec<D>& lo, hn::Vec<D>& hi, const Points<D>& q, const Points<D>& z) {
+  using V = hn::Vec<D>;
+  using M = hn::Mask<D>;
+  const D d;
+  const V zero = hn::Zero(d);
+  const M none_above = hn::Le(greatest(q), zero);
+  const auto is_above = [&](V i) HWY_ATTR {
+    return hn::Or(hn::Gt(i, zero), hn::And(none_above, hn::Eq(i, zero)));
+  };
+  const M x = is_above(q.x), y = is_above(q.y), w = is_above(q.z);
+  const M not_x = hn::Xor(y, w), not_y = hn::Xor(x, w);
+  const auto from_lone = [&](const Points<D>& i) HWY_ATTR {
+    return select<D>(not_x, select<D>(not_y, {i.z, i.x, i.y}, {i.y, i.z, i.x}), i);
+  };
+  const Points<D> p = from_lone(q), at = from_lone(z);
+  const auto crossing = [&](V other, V at_other) HWY_ATTR {
+    return hn::Add(at.x, hn::Mul(hn::Sub(at_other, at.x), hn::Div(p.x, hn::Sub(p.x, other))));
+  };
+  const V one = crossing(p.y, at.y), two = crossing(p.z, at.z);
+  lo = max_of(min_of(one, two), lo);
+  hi = min_of(max_of(one, two), hi);
+}
+
+constexpr float kEdgeOn = 0.015625f;  // LSP_EDGE_ON, which is not known yet
+
+// lsp_plane_depth of those that are met; the scaled normal times the direction goes to *across.
 template <class D>
 HWY_INLINE hn::Vec<D> plane_depth(const Points<D>& direction, hn::Vec<D> shear_z, const Points<D>& a,
-                                  const Points<D>& b, const Points<D>& c) {
+                                  const Points<D>& b, const Points<D>& c, const Passages<D>& passes,
+                                  hn::Vec<D>* across = nullptr) {
   using V = hn::Vec<D>;
   using M = hn::Mask<D>;
   const D d;
@@ -109,35 +175,21 @@ HWY_INLINE hn::Vec<D> plane_depth(const Points<D>& direction, hn::Vec<D> shear_z
   const V shrink = hn::BitCast(d, hn::ShiftLeft<23>(hn::Sub(hn::Set(du, uint32_t{254}), exponent)));
   const Points<D> g = times<D>(e, shrink), h = times<D>(f, shrink);
   const Points<D> n = cross(g, h);
-  const V t = hn::Div(dot(n, p), dot(n, direction));
-  const V za = hn::Mul(a.z, shear_z), zb = hn::Mul(b.z, shear_z), zc = hn::Mul(c.z, shear_z);
-  return min_of(max_of(max_of(za, zb), zc), max_of(min_of(min_of(za, zb), zc), t));
-}
-
-// Whether lines pass through triangles: lsp_triangle up to the determinant.
-template <class D>
-struct Passages {
-  hn::Vec<D> v, w, det;
-  hn::Mask<D> met;
-};
-template <class D>
-HWY_INLINE Passages<D> pass(const Points<D>& a, const Points<D>& b, const Points<D>& c, hn::Vec<D> shear_x,
-                            hn::Vec<D> shear_y) {
-  using V = hn::Vec<D>;
-  using M = hn::Mask<D>;
-  const D d;
-  const V ax = hn::Sub(a.x, hn::Mul(shear_x, a.z)), ay = hn::Sub(a.y, hn::Mul(shear_y, a.z));
-  const V bx = hn::Sub(b.x, hn::Mul(shear_x, b.z)), by = hn::Sub(b.y, hn::Mul(shear_y, b.z));
-  const V cx = hn::Sub(c.x, hn::Mul(shear_x, c.z)), cy = hn::Sub(c.y, hn::Mul(shear_y, c.z));
-  const V u = hn::Sub(hn::Mul(cx, by), hn::Mul(cy, bx));
-  const V v = hn::Sub(hn::Mul(ax, cy), hn::Mul(ay, cx));
-  const V w = hn::Sub(hn::Mul(bx, ay), hn::Mul(by, ax));
-  const V zero = hn::Zero(d), det = hn::Add(hn::Add(u, v), w);
-  // Of a NaN among them the determinant is one.
-  const M below = hn::Lt(hn::Min(hn::Min(u, v), w), zero), above = hn::Gt(hn::Max(hn::Max(u, v), w), zero);
-  // Finite and not zero; no number is neither less.
-  const M sound = hn::And(hn::Lt(hn::Abs(det), hn::Set(d, HUGE_VALF)), hn::Gt(hn::Abs(det), zero));
-  return {v, w, det, hn::AndNot(hn::And(below, above), sound)};
+  const V slope = dot(n, direction);
+  if (across != nullptr) *across = slope;
+  const V t = hn::Div(dot(n, p), slope);
+  const Points<D> z = {hn::Mul(a.z, shear_z), hn::Mul(b.z, shear_z), hn::Mul(c.z, shear_z)};
+  V lo = least(z), hi = greatest(z);
+  const M edge_on = hn::And(passes.met, hn::Lt(hn::Abs(slope), hn::Set(d, kEdgeOn)));
+  if (!hn::AllFalse(d, edge_on)) [[unlikely]] {
+    const auto extent = [](const Points<D>& i) HWY_ATTR { return hn::Sub(greatest(i), least(i)); };
+    const Points<D> q = select<D>(hn::Ge(extent(passes.x), extent(passes.y)), passes.x, passes.y);
+    V edges_lo = lo, edges_hi = hi;
+    narrow<D>(edges_lo, edges_hi, q, z);
+    lo = hn::IfThenElse(edge_on, edges_lo, lo);
+    hi = hn::IfThenElse(edge_on, edges_hi, hi);
+  }
+  return min_of(hi, max_of(lo, t));
 }
 
 using P4 = Points<D4>;
@@ -174,18 +226,18 @@ HWY_INLINE bool is_passed(const LspTriangle& triangle, const LspRay& ray) {
 // Of the triangles that the ray's line passes through, a bit each.
 template <class Text, class NumberOf>
 HWY_INLINE void keep_nearest(const lsp_scene& scene, const LspTriangle* const (&records)[kLeafLanes],
-                             uint32_t met, const RayRows& r, const P4& a, const P4& b, const P4& c, V4 v,
-                             V4 w, V4 det, NumberOf number_of, typename Text::LspBest& best) {
+                             uint32_t met, const RayRows& r, const P4& a, const P4& b, const P4& c,
+                             const Passages<D4>& passes, NumberOf number_of, typename Text::LspBest& best) {
   const P4 direction = {hn::Set(d4, r.direction[0]), hn::Set(d4, r.direction[1]),
                         hn::Set(d4, r.direction[2])};
-  const V4 t = plane_depth<D4>(direction, hn::Set(d4, r.shear[2]), a, b, c);
+  const V4 t = plane_depth<D4>(direction, hn::Set(d4, r.shear[2]), a, b, c, passes);
   met &= mask_bits(d4, hn::And(hn::Gt(t, hn::Set(d4, r.tmin)), hn::Le(t, hn::Set(d4, best.t))));
   if (met == 0) return;
   HWY_ALIGN float ts[kLeafLanes], vs[kLeafLanes], ws[kLeafLanes], dets[kLeafLanes];
   hn::Store(t, d4, ts);
-  hn::Store(v, d4, vs);
-  hn::Store(w, d4, ws);
-  hn::Store(det, d4, dets);
+  hn::Store(passes.v, d4, vs);
+  hn::Store(passes.w, d4, ws);
+  hn::Store(passes.det, d4, dets);
   for (; met != 0; met &= met - 1) {
     const auto lane = static_cast<uint32_t>(std::countr_zero(met));
     const uint32_t primitive = records[lane]->primitive;
@@ -224,7 +276,7 @@ HWY_INLINE void hit_triangles(const lsp_scene& scene, const LspTriangle* const (
   const P4 a = corner(0), b = corner(1), c = corner(2);
   const Passages<D4> p = pass<D4>(a, b, c, hn::Set(d4, r.shear[0]), hn::Set(d4, r.shear[1]));
   const uint32_t met = mask_bits(d4, p.met) & ((1u << count) - 1);
-  if (met != 0) keep_nearest<Text>(scene, records, met, r, a, b, c, p.v, p.w, p.det, number_of, best);
+  if (met != 0) keep_nearest<Text>(scene, records, met, r, a, b, c, p, number_of, best);
 }
 
 }  // namespace

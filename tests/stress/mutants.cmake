@@ -54,8 +54,11 @@ lsp_mutant(near_child_only bvh.h
 lsp_mutant(no_patch_clamp traverse.h
   "u = u < top ? u : top" "u = u < 2.0f * top ? u : top")
 lsp_mutant(no_depth_clamp traverse.h
-  "t = lsp_max(lsp_min(lsp_min(z.x, z.y), z.z), t);\n  return lsp_min(lsp_max(lsp_max(z.x, z.y), z.z), t);"
-  "return t;")
+  "t = lsp_max(range.x, t);\n  return lsp_min(range.y, t);" "return t;")
+lsp_mutant(hit_beside traverse.h
+  "if (lsp_min(lsp_min(ax, bx), cx) > 0.0f || lsp_max(lsp_max(ax, bx), cx) < 0.0f) return best;\n  if (lsp_min(lsp_min(ay, by), cy) > 0.0f || lsp_max(lsp_max(ay, by), cy) < 0.0f) return best;" "")
+lsp_mutant(plane_alone traverse.h
+  "if (across < LSP_EDGE_ON && across > -LSP_EDGE_ON) {" "if (false) {")
 lsp_mutant(slab_flipped traverse.h
   "lsp_max(lsp_min(a.z, b.z), s.tmin)" "lsp_max(lsp_max(a.z, b.z), s.tmin)")
 lsp_mutant(infinite_origin traverse.h

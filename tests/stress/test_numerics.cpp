@@ -92,6 +92,67 @@ TEST(Numerics, TriangleTestKeepsItsBounds) {
   EXPECT_GT(worst_depth, 0.05);
 }
 
+// From a point to a triangle (Ericson, "Real-Time Collision Detection", 2004, section 5.1.5).
+double distance(const glm::dvec3& p, const std::array<glm::vec3, 3>& corners) {
+  const glm::dvec3 a(corners[0]), b(corners[1]), c(corners[2]);
+  const auto to_edge = [&](const glm::dvec3& from, const glm::dvec3& to) {
+    const glm::dvec3 e = to - from;
+    const double along = glm::dot(e, e) == 0 ? 0 : glm::dot(p - from, e) / glm::dot(e, e);
+    return glm::distance(p, from + std::clamp(along, 0.0, 1.0) * e);
+  };
+  const glm::dvec3 n = glm::cross(b - a, c - a);
+  const auto is_inside = [&](const glm::dvec3& from, const glm::dvec3& to) {
+    return glm::dot(glm::cross(to - from, p - from), n) >= 0;
+  };
+  if (glm::dot(n, n) > 0 && is_inside(a, b) && is_inside(b, c) && is_inside(c, a))
+    return std::abs(glm::dot(p - a, n)) / glm::length(n);
+  return std::min({to_edge(a, b), to_edge(b, c), to_edge(c, a)});
+}
+
+// The farthest that a hit lies from its triangle, in u R, of rays along it: in its plane, or off it by
+// anything from a rounding to a tenth.
+using TriangleTest = bool (*)(const lsp_scene&, const LspRay&, uint32_t, float*);
+double farthest_off(TriangleTest test, uint64_t count, uint64_t* hits) {
+  Random random(11);
+  double worst = 0;
+  for (uint64_t i = 0; i < count; ++i) {
+    Trial t = trial(random);
+    const glm::dvec3 a(t.corners[0]), b(t.corners[1]), c(t.corners[2]);
+    const auto in_plane = [&] {
+      return a + (3 * random.uniform() - 1) * (b - a) + (3 * random.uniform() - 1) * (c - a);
+    };
+    const glm::dvec3 n = glm::cross(b - a, c - a);
+    const double length = glm::length(n);
+    if (length == 0) continue;
+    const double off = glm::length(b - a) * std::pow(10.0, -1 - 8 * random.uniform());
+    const glm::vec3 o(in_plane() + n / length * off), d(in_plane() - glm::dvec3(o));
+    t.ray = {{o.x, o.y, o.z}, -INFINITY, {d.x, d.y, d.z}, INFINITY};
+    const float largest = std::max({std::fabs(d.x), std::fabs(d.y), std::fabs(d.z)});
+    const OneTriangle one(t);
+    float depth = 0;
+    if (largest == 0 || !test(one.scene, t.ray, 0, &depth)) continue;
+    ++*hits;
+    double reach = 0;
+    for (const glm::vec3& corner : t.corners)
+      for (int k = 0; k < 3; ++k) reach = std::max(reach, std::abs(double(corner[k]) - double(o[k])));
+    const glm::dvec3 at = glm::dvec3(o) + glm::dvec3(d) * std::exp2(-std::ilogb(largest)) * double(depth);
+    worst = std::max(worst, distance(at, t.corners) / (kU * reach));
+  }
+  return worst;
+}
+
+// A ray along a triangle meets it where it is, however little the plane says about where.
+TEST(Numerics, HitsLieAtTheirTriangles) {
+  uint64_t hits = 0;
+  const double worst = farthest_off(sound::triangle, cases(), &hits);
+  std::cout << hits << " hits: off their triangle by at most " << worst << " u R\n";
+  EXPECT_GT(hits, cases() / 100);
+  EXPECT_LT(worst, 40);
+  // Each of the two things that see to it is missed where it is not.
+  EXPECT_GT(farthest_off(hit_beside::triangle, 100000, &hits), 1000);
+  EXPECT_GT(farthest_off(plane_alone::triangle, 100000, &hits), 1000);
+}
+
 // Where a triangle is hit its box is, and the entry is not behind the hit: what the margin is for. The margin
 // that would have been needed, found by bisection on boxes shrunk by hand, stays below the one there is.
 TEST(Numerics, BoxMarginIsEnough) {

@@ -242,14 +242,37 @@ LSP_FN float lsp_box_exit(LspSetup s, vec3 lo, vec3 hi) {
 #define LSP_FN_RARE LSP_FN
 #endif
 
+/* A triangle whose normal, of edges scaled to lengths about 1, has no more than this of the direction is taken for
+ * edge-on: the plane's depth may be off by 1e-4 of the scene and more. */
+#define LSP_EDGE_ON 0.015625f
+
+/* The depth at which an edge crosses zero by a coordinate that is p and q at its ends. */
+LSP_FN float lsp_crossing(float p, float q, float at_p, float at_q) {
+  precise float at = at_p + (at_q - at_p) * (p / (p - q));
+  return at;
+}
+
+/* The depths of the two edges that cross zero by coordinate q of the corners, whose depths are z. */
+LSP_FN vec2 lsp_crossings(vec3 q, vec3 z) {
+  /* The corner that is alone on its side; zero is on that side where no other corner is. */
+  bool none_above = lsp_max(lsp_max(q.x, q.y), q.z) <= 0.0f;
+  bool x = q.x > 0.0f || (none_above && q.x == 0.0f);
+  bool y = q.y > 0.0f || (none_above && q.y == 0.0f);
+  bool w = q.z > 0.0f || (none_above && q.z == 0.0f);
+  vec3 p = y == w ? q : (x == w ? vec3(q.y, q.z, q.x) : vec3(q.z, q.x, q.y));
+  vec3 at = y == w ? z : (x == w ? vec3(z.y, z.z, z.x) : vec3(z.z, z.x, z.y));
+  return vec2(lsp_crossing(p.x, p.y, at.x, at.y), lsp_crossing(p.x, p.z, at.x, at.z));
+}
+
 /* Where the ray meets the plane of a triangle that it passes: a, b, c are the corners seen from the origin,
- * the ray's axis last, as in `direction`. The corners' own depths averaged by the edge functions would be an
- * error of 5 u R over the smallest height of the triangle off, however near the hit; the plane is off by what
- * the normal is. That is best at the corner opposite the longest edge: of a needle the other two give a
- * difference of large products. No hit lies outside the depths of the corners, so what a needle can err is
- * bounded by its own extent. Edges are scaled by a power of two (exact): products of three small lengths
- * would underflow. */
-LSP_FN_RARE float lsp_plane_depth(vec3 direction, float shear_z, vec3 a, vec3 b, vec3 c) {
+ * the ray's axis last, as in `direction`, x and y their places across the ray. The corners' own depths averaged
+ * by the edge functions would be an error of 5 u R over the smallest height of the triangle off, however near
+ * the hit; the plane is off by what the normal is. That is best at the corner opposite the longest edge: of a
+ * needle the other two give a difference of large products. No hit lies outside the depths of the corners, and
+ * of a triangle that is edge-on none outside those of the two edges that the ray passes between: where the plane
+ * says nothing, the ray is at the triangle still. Edges are scaled by a power of two (exact): products of three
+ * small lengths would underflow. */
+LSP_FN_RARE float lsp_plane_depth(vec3 direction, float shear_z, vec3 a, vec3 b, vec3 c, vec3 x, vec3 y) {
   precise vec3 ab = b - a;
   precise vec3 bc = c - b;
   precise vec3 ca = a - c;
@@ -265,11 +288,20 @@ LSP_FN_RARE float lsp_plane_depth(vec3 direction, float shear_z, vec3 a, vec3 b,
   exponent = exponent < 1u ? 1u : (exponent > 253u ? 253u : exponent);
   float shrink = uintBitsToFloat((254u - exponent) << 23u);
   vec3 n = lsp_cross(e * shrink, f * shrink);
-  precise float t = lsp_dot(n, p) / lsp_dot(n, direction);
+  precise float across = lsp_dot(n, direction);
+  precise float t = lsp_dot(n, p) / across;
   precise vec3 z = vec3(a.z, b.z, c.z) * shear_z;
+  vec2 range = vec2(lsp_min(lsp_min(z.x, z.y), z.z), lsp_max(lsp_max(z.x, z.y), z.z));
+  if (across < LSP_EDGE_ON && across > -LSP_EDGE_ON) {
+    precise float x_extent = lsp_max(lsp_max(x.x, x.y), x.z) - lsp_min(lsp_min(x.x, x.y), x.z);
+    precise float y_extent = lsp_max(lsp_max(y.x, y.y), y.z) - lsp_min(lsp_min(y.x, y.y), y.z);
+    vec3 q = x_extent >= y_extent ? x : y;
+    vec2 edges = lsp_crossings(q, z);
+    range = vec2(lsp_max(lsp_min(edges.x, edges.y), range.x), lsp_min(lsp_max(edges.x, edges.y), range.y));
+  }
   /* In this order a NaN, of a triangle that the ray lies in, becomes the smallest depth. */
-  t = lsp_max(lsp_min(lsp_min(z.x, z.y), z.z), t);
-  return lsp_min(lsp_max(lsp_max(z.x, z.y), z.z), t);
+  t = lsp_max(range.x, t);
+  return lsp_min(range.y, t);
 }
 
 /* Watertight triangle test (Woop et al. 2013). Keeps a hit nearer than best.t and beyond tmin; of those at one
@@ -289,9 +321,12 @@ LSP_FN LspBest lsp_triangle(LspScene scene, LspSetup s, uint index, LspBest best
   precise float v = ax * cy - ay * cx;
   precise float w = bx * ay - by * ax;
   if ((u < 0.0f || v < 0.0f || w < 0.0f) && (u > 0.0f || v > 0.0f || w > 0.0f)) return best;
+  /* Seen edge-on its corners are in a line, and along that signs are lost to zero beyond its ends, too. */
+  if (lsp_min(lsp_min(ax, bx), cx) > 0.0f || lsp_max(lsp_max(ax, bx), cx) < 0.0f) return best;
+  if (lsp_min(lsp_min(ay, by), cy) > 0.0f || lsp_max(lsp_max(ay, by), cy) < 0.0f) return best;
   precise float det = u + v + w;
   if (det == 0.0f || !lsp_is_finite(det)) return best;
-  float t = lsp_plane_depth(lsp_rotate(s.direction, s.axis), s.shear.z, a, b, c);
+  float t = lsp_plane_depth(lsp_rotate(s.direction, s.axis), s.shear.z, a, b, c, vec3(ax, bx, cx), vec3(ay, by, cy));
   bool nearer = t < best.t || (t == best.t && tri.primitive < best.primitive);
   if (t > s.tmin && nearer) {
     if ((LSP_PARTS & LSP_PART_COVERAGE) != 0u && lsp_passes(s, tri)) return best;
