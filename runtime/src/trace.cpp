@@ -83,8 +83,7 @@ extern "C" lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options*
       return LSP_OK;
     }
 #endif
-    lsp::TraceCells& trace = partial ? lsp::partial::trace_cells : lsp::solid::trace_cells;
-    trace(*scene, any_hit, lsp_dial(scene, options), rays, hits, count, counts);
+    lsp::trace_cells(*scene, any_hit, lsp_dial(scene, options), rays, hits, count, counts);
     return LSP_OK;
   }
   if ((features & LSP_FEATURE_WIDE) != 0) {
@@ -94,8 +93,7 @@ extern "C" lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options*
       return LSP_OK;
     }
 #endif
-    (partial ? lsp::partial::trace_wide : lsp::solid::trace_wide)(*scene, flags, 0, rays, hits, count,
-                                                                  counts);
+    lsp::trace_wide(*scene, flags, 0, rays, hits, count, counts);
     return LSP_OK;
   }
   flags &= approximate ? LSP_TRACE_ALL_FLAGS : LSP_TRACE_ANY_HIT;

@@ -1,9 +1,8 @@
 #include "trace_cells.h"
 
 #include "trace_group.h"
-#include "trace_variant.h"
 
-namespace lsp::LSP_VARIANT {
+namespace lsp {
 namespace {
 
 using namespace subset;
@@ -27,4 +26,4 @@ LSP_CLONES void trace_cells(const lsp_scene& scene, bool any_hit, uint32_t dial,
   }
 }
 
-}  // namespace lsp::LSP_VARIANT
+}  // namespace lsp

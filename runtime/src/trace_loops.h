@@ -17,16 +17,16 @@ struct TraceLoops {
 // Of scenes whose triangles are solid, and of those where some are there in part.
 namespace solid {
 extern const TraceLoops kBvhLoops, kNTreeLoops;
-void trace_wide(const lsp_scene&, uint32_t flags, float lod, const LspRay*, LspHit*, uint64_t count,
-                lsp_trace_counts* counts);  // exact rays through wide nodes
 }  // namespace solid
 namespace partial {
 extern const TraceLoops kBvhLoops, kNTreeLoops;
-void trace_wide(const lsp_scene&, uint32_t flags, float lod, const LspRay*, LspHit*, uint64_t count,
-                lsp_trace_counts* counts);
 // A valid ray from so far away that an NTree treats it apart, of scenes of either kind.
 void trace_far_in_ntree(const lsp_scene&, uint32_t flags, float lod, const LspRay&, LspHit&,
                         lsp_trace_counts* counts);
 }  // namespace partial
+
+// Exact rays through wide nodes, of scenes of either kind.
+void trace_wide(const lsp_scene&, uint32_t flags, float lod, const LspRay*, LspHit*, uint64_t count,
+                lsp_trace_counts* counts);
 
 }  // namespace lsp

@@ -1,9 +1,8 @@
 // Exact rays of a scene with wide nodes, one after the other: those that are counted, and all where there are
 // no vectors. The others go through trace_wide_lanes.cpp.
 #include "trace_group.h"
-#include "trace_variant.h"
 
-namespace lsp::LSP_VARIANT {
+namespace lsp {
 namespace {
 
 using namespace subset;
@@ -21,4 +20,4 @@ LSP_CLONES void trace_wide(const lsp_scene& scene, uint32_t flags, float lod, co
   trace_singly<WideTraversal>(scene, flags, lod, rays, hits, count, counts);
 }
 
-}  // namespace lsp::LSP_VARIANT
+}  // namespace lsp

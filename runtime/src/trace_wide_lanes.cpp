@@ -184,8 +184,7 @@ class Tracer {
   // Invalid rays, and those whose products may overflow.
   LspHit trace_singly(const LspRay& ray, uint32_t flags) const {
     LspHit hit;
-    const bool partial = (scene_.header->required_features & LSP_FEATURE_COVERAGE) != 0;
-    (partial ? partial::trace_wide : solid::trace_wide)(scene_, flags, 0, &ray, &hit, 1, nullptr);
+    trace_wide(scene_, flags, 0, &ray, &hit, 1, nullptr);
     return hit;
   }
 
