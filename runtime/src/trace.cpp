@@ -79,7 +79,7 @@ extern "C" lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options*
 #ifdef LSP_SIMD
     const bool wide = counts == nullptr && count >= lsp::kFewRays;
     if (const lsp::WideCells* loop = wide ? lsp::wide_cells(*scene) : nullptr; loop != nullptr) {
-      loop->trace(*scene, flags, lsp_dial(scene, options), rays, hits, count);
+      loop->trace(*scene, flags | LSP_TRACE_APPROXIMATE, lsp_dial(scene, options), rays, hits, count);
       return LSP_OK;
     }
 #endif
@@ -88,6 +88,12 @@ extern "C" lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options*
   }
   if ((features & LSP_FEATURE_WIDE) != 0) {
 #ifdef LSP_SIMD
+    const bool in_cells =
+        counts == nullptr && !any_hit && count >= lsp::kFewExactRays && (features & LSP_FEATURE_CELLS) != 0;
+    if (const auto* loop = in_cells ? lsp::wide_cells_for_exact_rays(*scene) : nullptr; loop != nullptr) {
+      loop->trace(*scene, flags, 0, rays, hits, count);
+      return LSP_OK;
+    }
     if (const lsp::WideExact* loop = counts == nullptr ? lsp::wide_exact() : nullptr; loop != nullptr) {
       loop->trace(*scene, flags, rays, hits, count);
       return LSP_OK;

@@ -1,5 +1,5 @@
-// Approximate rays of a scene of cells across the lanes of a vector (Google Highway), compiled for each
-// instruction set and chosen when a trace is asked for.
+// Rays of a scene of cells across the lanes of a vector (Google Highway), compiled for each instruction set
+// and chosen when a trace is asked for.
 //
 // A pool of rays goes round by round, one cell a ray and round. A round has stages, and each asks for what
 // the next one reads, for all rays of the pool, so that no ray waits for memory alone (as trace_group.h does
@@ -8,6 +8,9 @@
 // origin tables are asked. Rays that are to be traced exactly in a cell leave the pool for lanes of their own
 // (wide_calls-inl.h), and come back if they hit nothing there.
 //
+// Exact rays ask no table: each cell that they come to is traced exactly until one has a hit. What numbers do
+// not settle (Calls::kUnsettled) and rays from afar are traced again by the tree, so that the hits are its.
+//
 // This is a second text of what lsp/cells.h says from lsp_begin to lsp_cell_meet, and of the half of
 // lsp_setup (lsp/traverse.h) that this needs, operation by operation: nothing is contracted, and comparisons
 // and selections stand for min and max, so that a lane has the bits of a single ray. tests/agreement/
@@ -15,9 +18,11 @@
 #include "trace_cells_wide.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "simd_targets.h"
+#include "trace_loops.h"
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "trace_cells_wide.cpp"
 #include <hwy/foreach_target.h>
@@ -35,6 +40,9 @@ namespace lsp {
 namespace HWY_NAMESPACE {
 namespace {
 
+// How far from the grid exact rays may begin, in the sum of its sides.
+constexpr float kReach = 2;
+
 // A ray's doubt_: a miss of it is a mistake, and it was one (LspWalk.closed, .again).
 constexpr uint32_t kClosed = 1, kAgain = 2;
 
@@ -50,6 +58,7 @@ struct Tracer : Rays<kPool> {
   const uint32_t dial;
   const uint32_t flags;
   const bool any_hit;
+  const bool tables;   // or exact rays
   const bool partial;  // some triangles are there in part
   Arrays arrays;
 
@@ -85,6 +94,7 @@ struct Tracer : Rays<kPool> {
         dial(dial),
         flags(flags),
         any_hit((flags & LSP_TRACE_ANY_HIT) != 0),
+        tables((flags & LSP_TRACE_APPROXIMATE) != 0),
         partial((scene.header->required_features & LSP_FEATURE_COVERAGE) != 0),
         arrays{or_zero(scene.filled_cells, scene.header->filled_cell_count),
                or_zero(scene.planes, scene.header->plane_count),
@@ -93,12 +103,15 @@ struct Tracer : Rays<kPool> {
                set_u(scene.header->plane_count),
                set_u(scene.header->split_count),
                set_u(scene.header->entry_word_count)},
-        calls(scene, rays, any_hit) {}
+        calls(scene, rays, any_hit, !tables) {}
 
   void end(uint32_t number, uint32_t flags) {
     hits[number] = Text::lsp_no_hit();
     hits[number].flags = flags;
   }
+
+  // An exact ray by the tree.
+  void settle(uint32_t number) { trace_wide(scene, flags, 0, rays + number, hits + number, 1, nullptr); }
 
   static HWY_INLINE MF is_finite(VF x) {
     const VU exponent = set_u(0x7F800000u);
@@ -145,7 +158,9 @@ struct Tracer : Rays<kPool> {
     store(number, ray_ + i);
     store(hn::Zero(du), step_ + i);
     store(hn::Zero(du), doubt_ + i);
-    begin(i, first, last, valid);
+    // Beyond, the margin of cells does not make up for what is rounded.
+    const VF reach = set(kReach * static_cast<float>(grid.cells_x + grid.cells_y + grid.cells_z));
+    begin(i, first, last, tables ? valid : hn::And(valid, hn::Lt(largest(load_3(origin_, i)), reach)));
   }
 
   // lsp_begin.
@@ -290,8 +305,12 @@ struct Tracer : Rays<kPool> {
     if (const Bits ended = bits_of(hn::AndNot(going, here)); ended != 0) {
       const Bits complete = bits_of(as_float(in_time));
       doubted = ended & complete & bits_of(as_float(hn::Eq(load(doubt_ + i), set_u(kClosed))));
-      LSP_FOR_BITS(k, ended & ~doubted)
-      end(ray_[i + k], (complete >> k & 1) != 0 ? 0 : LSP_HIT_INCOMPLETE);
+      LSP_FOR_BITS(k, ended & ~doubted) {
+        const bool is_over = (complete >> k & 1) != 0;
+        end(ray_[i + k], is_over ? 0 : LSP_HIT_INCOMPLETE);
+        if (!tables && !(is_over && t_last_[i + k] > -HUGE_VALF)) [[unlikely]]
+          settle(ray_[i + k]);
+      }
       over |= (ended & ~doubted) << i;
     }
     const VI of_grid = hn::Add(hn::Mul(hn::Add(hn::Mul(z, set_i(grid.cells_y)), y), set_i(grid.cells_x)), x);
@@ -332,6 +351,12 @@ struct Tracer : Rays<kPool> {
     filled |= look_bits << i;
 
     const VU cell = hn::And(word, set_u(~LSP_CELL_FILLED));
+    if (!tables) {
+      store(cell, index + i);
+      exact |= look_bits << i;
+      LSP_FOR_BITS(k, look_bits) fetch(scene.filled_cells, index[i + k]);
+      return;
+    }
     const V3 corner = corner_of(x, y, z);
     const V3 from = minus(point_at(o, d, t), corner), to = minus(point, corner);
     const auto face = [&](VI a, MF is_x, MF is_y, VI at_back, VI ahead) HWY_ATTR {
@@ -519,7 +544,13 @@ struct Tracer : Rays<kPool> {
   // Goes on with the exact traces until no more than `most` are under way.
   HWY_NOINLINE void trace_calls(size_t most) {
     calls.trace(
-        most, [&](uint32_t ray, const Text::LspBest& best) { add_found(ray, best); },
+        most,
+        [&](uint32_t ray, const Text::LspBest& best) {
+          if (best.triangle == Calls::kUnsettled) [[unlikely]]
+            settle(ray);
+          else
+            add_found(ray, best);
+        },
         [&](const Rays<Calls::kMost>& from, size_t i, Bits lanes) HWY_ATTR {
           waiting.take(from, i, lanes, waiting_count);
           waiting_count += static_cast<size_t>(std::popcount(lanes));
@@ -572,9 +603,9 @@ struct Tracer : Rays<kPool> {
       for (size_t i = old; i < n; i += kLanes) advance<true>(i, n);
       if (n == 0 && found.size() == 0) return;
       for (size_t i = 0; i < n; i += kLanes)
-        if (lanes_of(filled, i) != 0) classify(i);
+        if (tables && lanes_of(filled, i) != 0) classify(i);
       // Of the round before.
-      found.answer({scene, rays, hits, count, (flags & LSP_TRACE_OCCLUSION) != 0, true});
+      found.answer({scene, rays, hits, count, (flags & LSP_TRACE_OCCLUSION) != 0, tables});
       for (size_t i = 0; i < n; i += kLanes)
         if (lanes_of(split, i) != 0) choose(i);
       for (size_t i = 0; i < n; i += kLanes)
@@ -615,6 +646,15 @@ const WideCells* wide_cells(const lsp_scene& scene) {
   constexpr uint32_t kReach = 1u << 30;
   if (header.entry_word_count >= kReach || header.split_count >= kReach) return nullptr;
   return best_here(kWideCells);
+}
+
+const WideCells* wide_cells_for_exact_rays(const lsp_scene& scene) {
+  const WideCells* best = wide_cells(scene);
+  if (best == nullptr || scene.cell_references == nullptr) return nullptr;
+#if HWY_TARGETS & HWY_AVX3
+  if (best->runs_here == has_avx3) return best;
+#endif
+  return nullptr;
 }
 
 }  // namespace lsp

@@ -23,11 +23,16 @@ class Calls {
  public:
   static constexpr uint32_t kMost = 64;
 
-  Calls(const lsp_scene& scene, const LspRay* rays, bool any_hit)
+  // In place of a triangle, of rays that are exact as a whole: one was met at a t beyond the cell by no more
+  // than its rounding (of a plane along which the ray goes): whether it is hit, this call cannot tell.
+  static constexpr uint32_t kUnsettled = LSP_NONE - 1;
+
+  Calls(const lsp_scene& scene, const LspRay* rays, bool any_hit, bool exact_rays)
       : scene_(scene),
         grid_(scene.header->cells),
         rays_(rays),
         any_hit_(any_hit),
+        exact_rays_(exact_rays),
         partial_((scene.header->required_features & LSP_FEATURE_COVERAGE) != 0) {
     for (uint32_t& mark : stack_[0]) mark = LSP_CELL_NO_CHILD;
   }
@@ -91,6 +96,10 @@ class Calls {
  private:
   template <typename T>
   using Of = T[kMost + kLanes];
+
+  // What t is off by at most, times the cosine that plane_depth divides by, over the largest coordinate of
+  // the triangle from the ray's origin: 64 u times the lengths of two edges of at most 2 sqrt(3).
+  static constexpr float kRounding = 64 * 0x1p-24f * 12;
 
   // lsp_setup and the beginning of lsp_test_leaf, of rays that are valid: of what add() says.
   HWY_INLINE void set_up(size_t i, VU ray_count) {
@@ -265,7 +274,8 @@ class Calls {
     const V3 a = corner(record[0]), b = corner(record[1]), c = corner(record[2]);
     const Passages<DF> passes = pass<DF>(a, b, c, shear.x, shear.y);
     const MF met = hn::And(as_float(at_leaf), passes.met);
-    if (bits_of(met) != 0) keep(i, met, a, b, c, shear.z, passes, number, record[0][3]);
+    Bits unsettled = 0;
+    if (bits_of(met) != 0) unsettled = keep(i, met, a, b, c, shear.z, passes, number, record[0][3]);
 
     const MU is_last = hn::Eq(hn::And(ref, set_u(3u << LSP_CELL_LEAF_COUNT_SHIFT)), hn::Zero(du));
     const VU top = load(top_ + i), below = hn::Sub(top, set_u(1));
@@ -276,14 +286,19 @@ class Calls {
     if (any_hit_)
       next = select(hn::And(is_last, hn::Ne(load(triangle_ + i), set_u(LSP_NONE))), set_u(LSP_CELL_NO_CHILD),
                     next);
+    if (unsettled != 0) [[unlikely]]
+      next = select(as_uint(mask_of(unsettled)), set_u(LSP_CELL_NO_CHILD), next);
     store(select(at_leaf, next, ref), ref_ + i);
     store(select(pops, hn::Max(below, set_u(1)), top), top_ + i);
   }
 
-  // Of the triangles that rays pass through those that are nearer than what they have.
-  HWY_INLINE void keep(size_t i, MF met, const V3& a, const V3& b, const V3& c, VF shear_z,
+  // Of the triangles that rays pass through those that are nearer than what they have. Returned are rays that
+  // are not settled.
+  HWY_INLINE Bits keep(size_t i, MF met, const V3& a, const V3& b, const V3& c, VF shear_z,
                        const Passages<DF>& passes, VU number, VU primitive) {
-    const VF t = plane_depth<DF>(load_3(direction_, i), shear_z, a, b, c, passes), best = load(t_ + i);
+    VF across;
+    const VF t = plane_depth<DF>(load_3(direction_, i), shear_z, a, b, c, passes, &across),
+             best = load(t_ + i);
     const MF before = as_float(hn::Lt(primitive, load(primitive_ + i)));
     const MF nearer = hn::Or(hn::Lt(t, best), hn::And(hn::Eq(t, best), before));
     MF kept = hn::And(met, hn::And(hn::Gt(t, load(tmin_ + i)), nearer));
@@ -298,6 +313,19 @@ class Calls {
     put(hn::Div(passes.w, passes.det), v_);
     put(number, triangle_);
     put(primitive, primitive_);
+    if (!exact_rays_) return 0;
+    // Before the cell or behind it, and of the ray still; behind a hit it does not matter.
+    const VF first = load(tmin_ + i);
+    const MF is_early = hn::And(hn::Le(t, first), hn::Gt(t, load(of_.tmin_ + i)));
+    const MF is_late = hn::And(hn::And(hn::Gt(t, best), hn::Lt(t, load(of_.tmax_ + i))),
+                               as_float(hn::Eq(load(triangle_ + i), set_u(LSP_NONE))));
+    const VF far_out = max_of(max_of(largest(a), largest(b)), largest(c));
+    const VF beyond = hn::Mul(hn::Abs(across), max_of(hn::Sub(first, t), hn::Sub(t, best)));
+    const MF unsettled =
+        hn::And(hn::And(met, hn::Or(is_early, is_late)), hn::Le(beyond, hn::Mul(far_out, set(kRounding))));
+    kept = unsettled;
+    put(set_u(kUnsettled), triangle_);
+    return bits_of(unsettled);
   }
 
   // Of lanes those whose triangle is not there for their ray.
@@ -343,6 +371,7 @@ class Calls {
   const LspCellGrid& grid_;
   const LspRay* rays_;
   const bool any_hit_;
+  const bool exact_rays_;
   const bool partial_;  // some triangles are there in part
   size_t n_ = 0;        // under way; behind them what begins
   size_t added_ = 0;

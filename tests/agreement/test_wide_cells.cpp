@@ -182,11 +182,11 @@ TEST_P(WideCellsTest, SameBitsAsSingleRays) {
       for (const uint32_t any : {0u, LSP_TRACE_ANY_HIT}) {
         const lsp_trace_options options{LSP_TRACE_APPROXIMATE | LSP_TRACE_MAX_LOSS | any, 0, 0, max_loss};
         const auto single = single_rays(scene, options, rays);
-        wide_.trace(scene, any, lsp_dial(&scene, &options), rays.data(), wide.data(), rays.size());
+        wide_.trace(scene, options.flags, lsp_dial(&scene, &options), rays.data(), wide.data(), rays.size());
         expect_same(single, wide, rays, std::string(of.name) + ", loss " + std::to_string(max_loss));
         if (any == 0) continue;
-        wide_.trace(scene, any | LSP_TRACE_OCCLUSION, lsp_dial(&scene, &options), rays.data(), wide.data(),
-                    rays.size());
+        wide_.trace(scene, options.flags | LSP_TRACE_OCCLUSION, lsp_dial(&scene, &options), rays.data(),
+                    wide.data(), rays.size());
         expect_same_occlusion(single, wide);
       }
   }
@@ -201,9 +201,61 @@ TEST_P(WideCellsTest, AnyNumberOfRays) {
   for (const size_t count : {0, 1, 2, 3, 5, 8, 15, 17, 63, 64, 65, 129, 1000}) {
     const LspHit untouched{1, 2, 3, 4, {5, 6, 7}, 8};
     std::vector<LspHit> wide(count + 1, untouched);
-    wide_.trace(scene, 0, lsp_dial(&scene, &options), rays.data() + 100, wide.data(), count);
+    wide_.trace(scene, LSP_TRACE_APPROXIMATE, lsp_dial(&scene, &options), rays.data() + 100, wide.data(),
+                count);
     EXPECT_EQ(std::memcmp(wide.data(), single.data() + 100, count * sizeof(LspHit)), 0) << count;
     EXPECT_EQ(std::memcmp(&wide[count], &untouched, sizeof(LspHit)), 0) << count;
+  }
+}
+
+// Large triangles, of which each lies in many cells, and needles.
+Mesh hall() {
+  Mesh mesh = sphere(8);
+  for (const float z : {-2.0f, 2.0f}) {
+    add_triangle(mesh, {-7, -5, z}, {7, -5, z}, {7, 5, z});
+    add_triangle(mesh, {-7, -5, z}, {7, 5, z}, {-7, 5, z});
+  }
+  add_triangle(mesh, {-7, -5, -2}, {7, 5.5f, 1.5f}, {7, 5.51f, 1.52f});
+  for (int i = 0; i < 40; ++i) {
+    const float x = -6 + 0.3f * static_cast<float>(i);
+    add_triangle(mesh, {x, -4, -1}, {x + 1e-3f, -4, -1}, {x, 4, 1.5f});
+  }
+  return mesh;
+}
+
+// Along triangles: from somewhere in the plane of one, or hardly off it, to a point of it.
+std::vector<LspRay> grazing_rays(std::span<const LspTriangle> triangles, size_t count) {
+  Numbers numbers(23);
+  std::vector<LspRay> rays(count);
+  for (LspRay& ray : rays) {
+    const LspTriangle& t = triangles[numbers.below(static_cast<uint32_t>(triangles.size()))];
+    const auto vec = [](const lsp_float3& p) { return glm::vec3(p.x, p.y, p.z); };
+    const glm::vec3 a = vec(t.v0), b = vec(t.v1), c = vec(t.v2);
+    const glm::vec3 n = glm::cross(b - a, c - a) / std::max(1e-30f, glm::length(glm::cross(b - a, c - a)));
+    const auto in_plane = [&](float reach) {
+      return a + numbers.between(-reach, 1 + reach) * (b - a) + numbers.between(-reach, 1 + reach) * (c - a);
+    };
+    const glm::vec3 to = in_plane(0);
+    const float off = std::ldexp(glm::length(b - a), -static_cast<int>(numbers.below(40)));
+    const glm::vec3 from = in_plane(0.5f) + numbers.between(-1, 1) * off * n;
+    ray = {{from.x, from.y, from.z}, 0, {to.x - from.x, to.y - from.y, to.z - from.z}, kInfinity};
+  }
+  return rays;
+}
+
+// Exact rays through cells meet what they meet through the tree.
+TEST_P(WideCellsTest, ExactRaysAsThroughTheTree) {
+  std::vector<Scene> all = scenes(true);
+  all.push_back({"hall", bake_cells(hall(), 20)});
+  for (const Scene& of : all) {
+    const lsp_scene scene = view(of.baked);
+    std::vector<LspRay> rays = rays_of(of.baked);
+    const std::vector<LspRay> grazing = grazing_rays(of.baked.triangles, 20000);
+    rays.insert(rays.end(), grazing.begin(), grazing.end());
+    const auto single = single_rays(scene, {0, 0, 0, 0}, rays);
+    std::vector<LspHit> wide(rays.size());
+    wide_.trace(scene, 0, 0, rays.data(), wide.data(), rays.size());
+    expect_same(single, wide, rays, of.name);
   }
 }
 
@@ -243,7 +295,8 @@ TEST_P(WideCellsTest, SameBitsOfDamagedFiles) {
     for (const float max_loss : {100.0f, 2.0f}) {
       const lsp_trace_options options{LSP_TRACE_APPROXIMATE | LSP_TRACE_MAX_LOSS, 0, 0, max_loss};
       const auto single = single_rays(scene, options, rays);
-      wide_.trace(scene, 0, lsp_dial(&scene, &options), rays.data(), wide.data(), rays.size());
+      wide_.trace(scene, LSP_TRACE_APPROXIMATE, lsp_dial(&scene, &options), rays.data(), wide.data(),
+                  rays.size());
       expect_same(single, wide, rays, "damaged " + std::to_string(round));
     }
   }
