@@ -25,7 +25,7 @@ extern const WideCells kWideCells[];
 const WideCells* wide_cells(const lsp_scene& scene);
 
 // So few exact rays are faster through the tree.
-constexpr uint64_t kFewExactRays = 64;
+constexpr uint64_t kFewExactRays = 128;
 
 // The same for exact closest rays, where it is faster than the tree: with sixteen lanes (1.2x to 1.45x in
 // halls, with eight 0.9x to 1.0x). Null: the tree is.
