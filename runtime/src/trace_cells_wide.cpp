@@ -512,7 +512,7 @@ struct Tracer : Rays<kPool> {
     HWY_ALIGN float hit_t[kLanes];
     hn::Store(hit, df, hit_t);
     LSP_FOR_BITS(k, hit_bits) {
-      Text::LspBest best{};
+      Best best{};
       best.t = hit_t[k];
       best.triangle = lsp_load_plane_record(scene, plane[i + k]);
       best.flags = LSP_HIT_LINE_SPACE | (axis_[i + k] < 0 ? LSP_HIT_ORIGIN_INSIDE : 0u);
@@ -527,7 +527,7 @@ struct Tracer : Rays<kPool> {
 
   // A plane of a triangle that is there in part: the cell is traced exactly; from tables alone the ray either
   // meets it or goes on.
-  HWY_NOINLINE void meet_in_part(size_t k, const Text::LspBest& plane) {
+  HWY_NOINLINE void meet_in_part(size_t k, const Best& plane) {
     if (dial == LSP_DIAL_TABLES) {
       if (is_passed<Text>(lsp_load_triangle(scene, plane.triangle), rays[ray_[k]])) return;
       over |= Bits{1} << k;
@@ -537,7 +537,7 @@ struct Tracer : Rays<kPool> {
     in_part |= Bits{1} << k;
   }
 
-  HWY_INLINE void add_found(uint32_t number, const Text::LspBest& best) {
+  HWY_INLINE void add_found(uint32_t number, const Best& best) {
     found.add(scene, number, best.triangle, best.t, best.u, best.v, best.flags);
   }
 
@@ -545,7 +545,7 @@ struct Tracer : Rays<kPool> {
   HWY_NOINLINE void trace_calls(size_t most) {
     calls.trace(
         most,
-        [&](uint32_t ray, const Text::LspBest& best) {
+        [&](uint32_t ray, const Best& best) {
           if (best.triangle == Calls::kUnsettled) [[unlikely]]
             settle(ray);
           else

@@ -166,7 +166,7 @@ class Tracer {
 
   template <bool kAny>
   HWY_INLINE void trace_one(const Ready& r, uint32_t number, LspHit& hit) {
-    Text::LspBest best{};
+    Best best{};
     best.t = r.tmax;
     best.triangle = LSP_NONE;
     const bool complete = node_count_ == 0 || walk<kAny>(r, best);
@@ -348,8 +348,7 @@ class Tracer {
   }
 
   // lsp_triangle of a leaf's, four at a time.
-  HWY_NOINLINE void hit_leaf(const LspWideNode& node, uint32_t child, const Ready& r,
-                             Text::LspBest& best) const {
+  HWY_NOINLINE void hit_leaf(const LspWideNode& node, uint32_t child, const Ready& r, Best& best) const {
     uint32_t first = (node.triangle_first + (child & LSP_WIDE_LEAF_FIRST_MASK)) & LSP_LEAF_FIRST_MASK;
     uint32_t count = (child >> LSP_WIDE_LEAF_COUNT_SHIFT & LSP_LEAF_COUNT_MASK) + 1;
     if (first >= triangle_count_ || count > triangle_count_ - first) return;  // of a damaged file
@@ -357,7 +356,7 @@ class Tracer {
     hit_four(first, count, r, best);
   }
 
-  HWY_INLINE void hit_four(uint32_t first, uint32_t count, const Ready& r, Text::LspBest& best) const {
+  HWY_INLINE void hit_four(uint32_t first, uint32_t count, const Ready& r, Best& best) const {
     // Where there are fewer, what follows is read with them and not heeded.
     const LspTriangle* triangles = scene_.triangles + first;
     LspTriangle copies[kLeafLanes];
@@ -378,7 +377,7 @@ class Tracer {
 
   // From the root on. False: the file's bounds are wrong.
   template <bool kAny>
-  HWY_INLINE bool walk(const Ready& r, Text::LspBest& best) {
+  HWY_INLINE bool walk(const Ready& r, Best& best) {
     const V8 tmin = hn::Set(d8, r.tmin);
     uint32_t left = most_, at = 0;
     const LspWideNode* node = nodes_;

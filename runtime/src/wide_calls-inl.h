@@ -338,8 +338,8 @@ class Calls {
     return out;
   }
 
-  Text::LspBest best_of(size_t k) const {
-    Text::LspBest best{};
+  Best best_of(size_t k) const {
+    Best best{};
     best.t = t_[k];
     best.u = u_[k];
     best.v = v_[k];

@@ -96,6 +96,12 @@ HWY_INLINE hn::Vec<D> largest(const Points<D>& a) {
   return max_of(max_of(hn::Abs(a.x), hn::Abs(a.y)), hn::Abs(a.z));
 }
 
+// What a ray has hit so far: LspBest (lsp/traverse.h), and of an exact hit the weights of corners 1 and 2.
+struct Best {
+  float t, u, v;
+  uint32_t triangle, primitive, flags;
+};
+
 // Lines of rays, and triangles that they pass through: lsp_triangle up to the determinant.
 template <class D>
 struct Passages {
@@ -227,7 +233,7 @@ HWY_INLINE bool is_passed(const LspTriangle& triangle, const LspRay& ray) {
 template <class Text, class NumberOf>
 HWY_INLINE void keep_nearest(const lsp_scene& scene, const LspTriangle* const (&records)[kLeafLanes],
                              uint32_t met, const RayRows& r, const P4& a, const P4& b, const P4& c,
-                             const Passages<D4>& passes, NumberOf number_of, typename Text::LspBest& best) {
+                             const Passages<D4>& passes, NumberOf number_of, Best& best) {
   const P4 direction = {hn::Set(d4, r.direction[0]), hn::Set(d4, r.direction[1]),
                         hn::Set(d4, r.direction[2])};
   const V4 t = plane_depth<D4>(direction, hn::Set(d4, r.shear[2]), a, b, c, passes);
@@ -255,8 +261,7 @@ HWY_INLINE void keep_nearest(const lsp_scene& scene, const LspTriangle* const (&
 // Of `count` records of the four; number_of a lane is that of its record.
 template <class Text, class NumberOf>
 HWY_INLINE void hit_triangles(const lsp_scene& scene, const LspTriangle* const (&records)[kLeafLanes],
-                              uint32_t count, const RayRows& r, NumberOf number_of,
-                              typename Text::LspBest& best) {
+                              uint32_t count, const RayRows& r, NumberOf number_of, Best& best) {
   // Seen from the origin, the ray's axis last.
   const auto corner = [&](size_t c) HWY_ATTR {
     const auto row = [&](size_t i) HWY_ATTR {

@@ -42,8 +42,8 @@ lsp_variant(sound)
 lsp_mutant(no_box_margin traverse.h
   "r * 9.5367432e-7f + a * 2.3841858e-7f" "0.0f * r * a")
 lsp_mutant(edges_are_outside traverse.h
-  "(u < 0.0f || v < 0.0f || w < 0.0f) && (u > 0.0f || v > 0.0f || w > 0.0f)"
-  "!(u > 0.0f && v > 0.0f && w > 0.0f) && !(u < 0.0f && v < 0.0f && w < 0.0f)")
+  "(g.u < 0.0f || g.v < 0.0f || g.w < 0.0f) && (g.u > 0.0f || g.v > 0.0f || g.w > 0.0f)"
+  "!(g.u > 0.0f && g.v > 0.0f && g.w > 0.0f) && !(g.u < 0.0f && g.v < 0.0f && g.w < 0.0f)")
 lsp_mutant(farther_wins traverse.h
   "if (t > s.tmin && nearer) {" "if (t > s.tmin && (nearer || best.triangle != LSP_NONE)) {")
 lsp_mutant(tmin_ignored traverse.h
@@ -56,7 +56,7 @@ lsp_mutant(no_patch_clamp traverse.h
 lsp_mutant(no_depth_clamp traverse.h
   "t = lsp_max(range.x, t);\n  return lsp_min(range.y, t);" "return t;")
 lsp_mutant(hit_beside traverse.h
-  "if (lsp_min(lsp_min(ax, bx), cx) > 0.0f || lsp_max(lsp_max(ax, bx), cx) < 0.0f) return best;\n  if (lsp_min(lsp_min(ay, by), cy) > 0.0f || lsp_max(lsp_max(ay, by), cy) < 0.0f) return best;" "")
+  "if (lsp_all_beside(g.x) || lsp_all_beside(g.y)) return best;" "")
 lsp_mutant(plane_alone traverse.h
   "if (across < LSP_EDGE_ON && across > -LSP_EDGE_ON) {" "if (false) {")
 lsp_mutant(slab_flipped traverse.h

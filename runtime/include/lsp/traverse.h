@@ -97,12 +97,9 @@ struct LspSetup {
   bool valid; /* else nothing but this is set */
 };
 
-/* A hit in the making: the triangle record, its t (scaled) and, of an exact one, the weights of corners 1
- * and 2. */
+/* A hit in the making: the triangle record and its t (scaled). */
 struct LspBest {
   float t;
-  float u;
-  float v;
   uint triangle;  /* record, LSP_NONE: none */
   uint primitive; /* its, of an exact hit */
   uint flags;     /* LSP_HIT_* */
@@ -113,8 +110,6 @@ struct LspBest {
 LSP_FN LspBest lsp_no_best(LspSetup s) {
   LspBest best;
   best.t = s.tmax;
-  best.u = 0.0f;
-  best.v = 0.0f;
   best.triangle = LSP_NONE;
   best.primitive = 0u; /* none comes before it */
   best.flags = 0u;
@@ -304,37 +299,68 @@ LSP_FN_RARE float lsp_plane_depth(vec3 direction, float shear_z, vec3 a, vec3 b,
   return lsp_min(range.y, t);
 }
 
+/* A triangle as a ray sees it: the corners from its origin, its axis last; their places across it; and the edge
+ * functions there. */
+struct LspSight {
+  vec3 a;
+  vec3 b;
+  vec3 c;
+  vec3 x;
+  vec3 y;
+  float u;
+  float v;
+  float w;
+};
+LSP_FN LspSight lsp_sight(LspSetup s, LspTriangle tri) {
+  LspSight g;
+  g.a = lsp_rotate(lsp_vec3(tri.v0) - s.origin, s.axis);
+  g.b = lsp_rotate(lsp_vec3(tri.v1) - s.origin, s.axis);
+  g.c = lsp_rotate(lsp_vec3(tri.v2) - s.origin, s.axis);
+  precise float ax = g.a.x - s.shear.x * g.a.z;
+  precise float ay = g.a.y - s.shear.y * g.a.z;
+  precise float bx = g.b.x - s.shear.x * g.b.z;
+  precise float by = g.b.y - s.shear.y * g.b.z;
+  precise float cx = g.c.x - s.shear.x * g.c.z;
+  precise float cy = g.c.y - s.shear.y * g.c.z;
+  precise float u = cx * by - cy * bx;
+  precise float v = ax * cy - ay * cx;
+  precise float w = bx * ay - by * ax;
+  g.x = vec3(ax, bx, cx);
+  g.y = vec3(ay, by, cy);
+  g.u = u;
+  g.v = v;
+  g.w = w;
+  return g;
+}
+
+/* Weights of corners 1 and 2 of a triangle that a ray has hit. */
+LSP_FN vec2 lsp_hit_weights(LspSetup s, LspTriangle tri) {
+  LspSight g = lsp_sight(s, tri);
+  precise float det = g.u + g.v + g.w;
+  precise vec2 weights = vec2(g.v / det, g.w / det); /* not by 1 / det: det may be so small that it is infinite */
+  return weights;
+}
+
+/* Whether zero is not among three numbers nor between them. */
+LSP_FN bool lsp_all_beside(vec3 p) {
+  return lsp_min(lsp_min(p.x, p.y), p.z) > 0.0f || lsp_max(lsp_max(p.x, p.y), p.z) < 0.0f;
+}
+
 /* Watertight triangle test (Woop et al. 2013). Keeps a hit nearer than best.t and beyond tmin; of those at one
  * distance that of the lowest primitive: the answer does not depend on the order in which triangles are met. */
 LSP_FN LspBest lsp_triangle(LspScene scene, LspSetup s, uint index, LspBest best) {
   LspTriangle tri = lsp_load_triangle(scene, index);
-  vec3 a = lsp_rotate(lsp_vec3(tri.v0) - s.origin, s.axis);
-  vec3 b = lsp_rotate(lsp_vec3(tri.v1) - s.origin, s.axis);
-  vec3 c = lsp_rotate(lsp_vec3(tri.v2) - s.origin, s.axis);
-  precise float ax = a.x - s.shear.x * a.z;
-  precise float ay = a.y - s.shear.y * a.z;
-  precise float bx = b.x - s.shear.x * b.z;
-  precise float by = b.y - s.shear.y * b.z;
-  precise float cx = c.x - s.shear.x * c.z;
-  precise float cy = c.y - s.shear.y * c.z;
-  precise float u = cx * by - cy * bx;
-  precise float v = ax * cy - ay * cx;
-  precise float w = bx * ay - by * ax;
-  if ((u < 0.0f || v < 0.0f || w < 0.0f) && (u > 0.0f || v > 0.0f || w > 0.0f)) return best;
+  LspSight g = lsp_sight(s, tri);
+  if ((g.u < 0.0f || g.v < 0.0f || g.w < 0.0f) && (g.u > 0.0f || g.v > 0.0f || g.w > 0.0f)) return best;
   /* Seen edge-on its corners are in a line, and along that signs are lost to zero beyond its ends, too. */
-  if (lsp_min(lsp_min(ax, bx), cx) > 0.0f || lsp_max(lsp_max(ax, bx), cx) < 0.0f) return best;
-  if (lsp_min(lsp_min(ay, by), cy) > 0.0f || lsp_max(lsp_max(ay, by), cy) < 0.0f) return best;
-  precise float det = u + v + w;
+  if (lsp_all_beside(g.x) || lsp_all_beside(g.y)) return best;
+  precise float det = g.u + g.v + g.w;
   if (det == 0.0f || !lsp_is_finite(det)) return best;
-  float t = lsp_plane_depth(lsp_rotate(s.direction, s.axis), s.shear.z, a, b, c, vec3(ax, bx, cx), vec3(ay, by, cy));
+  float t = lsp_plane_depth(lsp_rotate(s.direction, s.axis), s.shear.z, g.a, g.b, g.c, g.x, g.y);
   bool nearer = t < best.t || (t == best.t && tri.primitive < best.primitive);
   if (t > s.tmin && nearer) {
     if ((LSP_PARTS & LSP_PART_COVERAGE) != 0u && lsp_passes(s, tri)) return best;
     best.t = t;
-    precise float weight1 = v / det; /* not by 1 / det: det may be so small that it is infinite */
-    precise float weight2 = w / det;
-    best.u = weight1;
-    best.v = weight2;
     best.triangle = index;
     best.primitive = tri.primitive;
     best.flags = 0u;
@@ -413,8 +439,8 @@ LSP_FN LspHit lsp_finish_as(LspScene scene, LspSetup s, LspRay ray, LspBest best
   LspTriangle tri = lsp_load_triangle(scene, best.triangle);
   vec3 v0 = lsp_vec3(tri.v0);
   vec3 n = lsp_cross(lsp_vec3(tri.v1) - v0, lsp_vec3(tri.v2) - v0);
-  vec2 weights = vec2(best.u, best.v);
-  if ((best.flags & LSP_HIT_LINE_SPACE) != 0u) weights = lsp_plane_weights(s, tri, best.t);
+  bool from_table = (best.flags & LSP_HIT_LINE_SPACE) != 0u;
+  vec2 weights = from_table ? lsp_plane_weights(s, tri, best.t) : lsp_hit_weights(s, tri);
   if (lsp_has_normals(scene)) {
     vec2 at = weights;
     /* A plane stands for more of the surface here than a candidate does: beyond its triangle extrapolated normals turn
