@@ -63,14 +63,17 @@ int show(const Arguments& arguments, const CommonOptions& common) {
   const MappedFile file(arguments.file);
   if (arguments.annotate) {
     find_section(file.bytes(), arguments);
-    print_annotation(arguments, common, file.bytes());
+    if (common.json || !common.quiet) print_annotation(arguments, common, file.bytes());
     return 0;
   }
-  const Json summary = summarize(file.bytes(), arguments.file, arguments.memory_limit);
+  Json summary = summarize(file.bytes(), arguments.file, arguments.memory_limit);
   find_section(file.bytes(), arguments);
-  if (common.json)
+  if (common.json) {
+    Json& sections = summary["sections"];
+    for (size_t i = sections.size(); i-- > 0 && !arguments.section.empty();)
+      if (sections[i]["name"] != arguments.section) sections.erase(i);
     print_json(summary);
-  else if (!common.quiet)
+  } else if (!common.quiet)
     std::fputs(summary_text(summary, arguments.section).c_str(), stdout);
   return 0;
 }

@@ -216,6 +216,10 @@ Exit run(const Options& options) {
   const std::filesystem::path inputs[] = {options.file, options.rays};
   check_output(options.hits, inputs);
   const Scene scene(options.file);
+  if (scene.instanced() != nullptr) {
+    const auto& assets = scene.instanced()->asset_paths();
+    check_output(options.hits, std::vector<std::filesystem::path>(assets.begin(), assets.end()));
+  }
   const std::vector<LspRay> rays = read_rays(options.rays);
   std::vector<LspHit> hits(rays.size());
   const TraceRequest request = make_request(options, scene);

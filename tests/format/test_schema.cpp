@@ -155,6 +155,10 @@ TEST(Program, ExitCodes) {
   EXPECT_EQ(run(info + " " + (kCorpus / "index.json").string()).exit, 3);
   EXPECT_EQ(run(info + " " + (kCorpus / "invalid/LSP-0104-other-major.lsp").string()).exit, 5);
   EXPECT_EQ(run(info + " /no/such/file.lsp").exit, 2);
+  EXPECT_EQ(run(info + " --quiet " + valid).out + run(info + " --quiet --annotate " + valid).out, "");
+  const Json one = Json::parse(run(info + " --json --section NODE " + valid).out, nullptr, false);
+  ASSERT_EQ(one["sections"].size(), 1u);
+  EXPECT_EQ(one["sections"][0]["name"], "NODE");
   const lsp::test::TemporaryFolder folder;
   ASSERT_EQ(mkfifo((folder.path() / "pipe").c_str(), 0600), 0);  // nobody writes to it
   for (const std::string& program : {validate, info})

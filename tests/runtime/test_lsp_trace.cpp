@@ -211,6 +211,8 @@ TEST_F(LspTrace, InstancesOfSeveralFiles) {
   const std::string empty = R"({"lsp_scene": 1, "assets": [], "instances": []})";
   write("empty.json", empty.data(), empty.size());
   EXPECT_EQ(run(std::string("empty.json") + kFiles), 0) << err();
+  EXPECT_EQ(run("scene.json --rays rays.bin --hits ./packed.lsp"), 1) << "an asset would be lost";
+  EXPECT_EQ(read_bytes(folder_ / "packed.lsp").substr(1, 3), "LSP");
 }
 
 TEST_F(LspTrace, VulkanTracesInstances) {
