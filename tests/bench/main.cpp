@@ -122,11 +122,13 @@ class RunningReport {
 
 void add_scenes(Context& context, const Arguments& arguments) {
   for (const std::string& scene : arguments.scenes) {
-    if (!std::filesystem::exists(scene)) throw Failure(Exit::kFile, scene, "does not exist");
+    if (!std::filesystem::exists(scene)) throw Failure(Exit::kFile, scene, "does not exist; check the path");
   }
   std::error_code error;
   std::filesystem::create_directories(context.cache, error);
-  if (error) throw Failure(Exit::kFile, context.cache.string(), "cannot be made: " + error.message());
+  if (error)
+    throw Failure(Exit::kFile, context.cache.string(),
+                  "cannot be made: " + error.message() + "; give another folder with -o");
   for (const std::string& scene : arguments.scenes) {
     context.progress("bake " + scene);
     try {
