@@ -186,9 +186,9 @@ class SceneBake {
     OutputFile scene(a_.output);
     scene.write(text.data(), text.size());
     scene.finish();
+    if (!a_.depfile.empty()) write_depfile(a_, scene_.sources);
     for (const auto& file : files_) file->commit();
     scene.commit();
-    if (!a_.depfile.empty()) write_depfile(a_, scene_.sources);
   }
 
   bool has_origin() const { return scene_.origin != glm::dvec3(0); }

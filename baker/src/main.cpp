@@ -31,16 +31,16 @@ void bake_one(Arguments& a, ProgressBar& bar) {
   if (!a.shard.empty()) {
     const std::vector<std::string> names = names_of(mesh.materials);
     make_color_materials(mesh);
+    if (!a.depfile.empty()) write_depfile(a, mesh.sources);
     write_shard(a, {mesh, names, source, import_seconds}, write_options(a),
                 [&](std::string_view stage, double share) { bar.show(stage, share); });
-    if (!a.depfile.empty()) write_depfile(a, mesh.sources);
     return;
   }
 
   const FileBake done = bake_file(mesh, a, source, nullptr,
                                   [&](std::string_view stage, double share) { bar.show(stage, share); });
+  if (!a.depfile.empty()) write_depfile(a, mesh.sources);  // where it cannot be, the old output stays
   done.file->commit();
-  if (!a.depfile.empty()) write_depfile(a, mesh.sources);
   bar.clear();
 
   const BakeReport report = {

@@ -267,6 +267,7 @@ TEST_F(LspBake, AFullDeviceIsAnError) {
   EXPECT_EQ(run("grid.obj -o full --base wide"), 2);
   EXPECT_TRUE(fs::is_symlink(folder_ / "full"));
   EXPECT_EQ(run("grid.obj -o a.lsp --base wide --depfile full"), 2);
+  EXPECT_FALSE(fs::exists(folder_ / "a.lsp"));
   for (const std::string arguments : {"--help", "--version", "grid.obj -o a.lsp --base wide"})
     EXPECT_EQ(shell("lsp-bake " + arguments + " >/dev/full 2>err", folder_), 2) << arguments;
 }
