@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "color_materials.h"
+#include "lsp/output_file.h"
 #include "lsp/program.h"
 #include "provenance.h"
 #include "timer.h"
@@ -47,10 +48,20 @@ FileBake bake_file(Mesh& mesh, Arguments& a, const std::array<uint64_t, 2>& sour
   Timer timer;
   progress("write", 0);
   out.meta = meta_of(out.chosen);
-  out.file = std::make_unique<TemporaryFile>(a.output);
+  out.file = std::make_unique<OutputFile>(a.output);
   out.written = write_lsp(*out.file, out.chosen.baked, out.meta.dump(), options);
   out.write_seconds = timer();
   return out;
+}
+
+void check_outputs(const Arguments& a, std::span<const std::filesystem::path> sources) {
+  check_output(a.output, sources);
+  if (a.depfile.empty()) return;
+  check_output(a.depfile, sources);
+  std::error_code error;
+  if (a.depfile.lexically_normal() == a.output.lexically_normal() ||
+      std::filesystem::equivalent(a.depfile, a.output, error))
+    throw Failure(Exit::kUsage, a.depfile.string(), "is the name of the output, too; give --depfile another");
 }
 
 void refuse_notes(const std::vector<std::string>& notes, const Arguments& a) {

@@ -15,7 +15,7 @@ namespace lsp {
 struct FileBake {
   Chosen chosen;
   nlohmann::ordered_json meta;
-  std::unique_ptr<TemporaryFile> file;  // whole, but for its name: commit() is the caller's
+  std::unique_ptr<OutputFile> file;  // whole, but for its name: commit() is the caller's
   Written written;
   double write_seconds = 0;
 };
@@ -30,6 +30,9 @@ std::vector<std::string> names_of(const std::vector<Material>& materials);
 // Throws Failure.
 FileBake bake_file(Mesh& mesh, Arguments& a, const std::array<uint64_t, 2>& source,
                    const nlohmann::ordered_json& part, const Progress& progress);
+
+// check_output() of all that is written, against files that are read.
+void check_outputs(const Arguments& a, std::span<const std::filesystem::path> sources);
 
 // --strict: what is not read, or not as it stands, is an error; prints them all. Nothing without notes.
 void refuse_notes(const std::vector<std::string>& notes, const Arguments& a);

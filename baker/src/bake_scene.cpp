@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cinttypes>
 #include <cstdio>
-#include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -13,6 +12,7 @@
 #include "import/instances.h"
 #include "import/source_file.h"
 #include "lsp/instances.hpp"
+#include "lsp/print_json.h"
 #include "lsp/program.h"
 #include "provenance.h"
 #include "report.h"
@@ -115,6 +115,7 @@ class SceneBake {
       throw Failure(Exit::kUsage, a_.output.string(), "is not UTF-8, and JSON is: choose another name");
     bar_.show("import", 0);
     scene_ = import_instances(a_.inputs, import_options(a_));
+    for (const auto& files : scene_.sources) check_outputs(a_, files);
     if (a_.strict) refuse_notes(scene_.notes, a_);
     check_instances(scene_, a_);
     uses_.resize(scene_.assets.size());
@@ -182,19 +183,19 @@ class SceneBake {
   void write() {
     bar_.show("write", 0);
     const std::string text = scene_text();
-    TemporaryFile scene(a_.output);
+    OutputFile scene(a_.output);
     scene.write(text.data(), text.size());
     scene.finish();
+    if (!a_.depfile.empty()) write_depfile(a_, scene_.sources);
     for (const auto& file : files_) file->commit();
     scene.commit();
-    if (!a_.depfile.empty()) write_depfile(a_, scene_.sources);
   }
 
   bool has_origin() const { return scene_.origin != glm::dvec3(0); }
 
   void print() {
     if (a_.common.json) {
-      std::cout << json().dump(2) << "\n";
+      print_json(json());
     } else if (!a_.common.quiet) {
       print_text();
     }
@@ -235,9 +236,9 @@ class SceneBake {
   Timer timer_;
   double import_seconds_ = 0, bake_seconds_ = 0;
   InstancedMeshes scene_;
-  std::vector<uint64_t> uses_;                         // of each asset
-  std::vector<std::array<uint64_t, 2>> hashes_;        // of each input's sources
-  std::vector<std::unique_ptr<TemporaryFile>> files_;  // of each asset
+  std::vector<uint64_t> uses_;                      // of each asset
+  std::vector<std::array<uint64_t, 2>> hashes_;     // of each input's sources
+  std::vector<std::unique_ptr<OutputFile>> files_;  // of each asset
   std::vector<Json> reports_;
   Totals totals_;
 };

@@ -1,7 +1,6 @@
 // lsp-bake: turns meshes into an .lsp file, or into several and a scene of them.
 #include <tbb/global_control.h>
 
-#include <iostream>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -10,10 +9,11 @@
 #include "bake_scene.h"
 #include "color_materials.h"
 #include "lsp/command_line.h"
+#include "lsp/output_file.h"
+#include "lsp/print_json.h"
 #include "provenance.h"
 #include "report.h"
 #include "shard/write_shard.h"
-#include "temporary_file.h"
 #include "timer.h"
 
 namespace {
@@ -24,35 +24,36 @@ void bake_one(Arguments& a, ProgressBar& bar) {
   Timer timer;
   bar.show("import", 0);
   Mesh mesh = import_meshes(a.inputs, import_options(a));
+  for (const auto& files : mesh.sources) check_outputs(a, files);
   if (a.strict) refuse_notes(mesh.notes, a);
   const auto source = hash_sources(mesh);
   const double import_seconds = timer();
   if (!a.shard.empty()) {
     const std::vector<std::string> names = names_of(mesh.materials);
     make_color_materials(mesh);
+    if (!a.depfile.empty()) write_depfile(a, mesh.sources);
     write_shard(a, {mesh, names, source, import_seconds}, write_options(a),
                 [&](std::string_view stage, double share) { bar.show(stage, share); });
-    if (!a.depfile.empty()) write_depfile(a, mesh.sources);
     return;
   }
 
   const FileBake done = bake_file(mesh, a, source, nullptr,
                                   [&](std::string_view stage, double share) { bar.show(stage, share); });
+  if (!a.depfile.empty()) write_depfile(a, mesh.sources);  // where it cannot be, the old output stays
   done.file->commit();
-  if (!a.depfile.empty()) write_depfile(a, mesh.sources);
   bar.clear();
 
   const BakeReport report = {
       a, mesh, done.chosen.baked, done.chosen.error, done.written, import_seconds, done.write_seconds};
   if (a.common.json)
-    std::cout << report_json(report, done.meta).dump(2) << "\n";
+    print_json(report_json(report, done.meta));
   else if (!a.common.quiet)
     print_report(report);
 }
 
 Exit run(Arguments a) {
   settle(a);
-  check_folder(a.output);
+  check_outputs(a, a.inputs);
   std::unique_ptr<tbb::global_control> control;
   if (a.threads)
     control = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism, a.threads);
@@ -63,6 +64,12 @@ Exit run(Arguments a) {
     bake_one(a, bar);
   return Exit::kDone;
 }
+
+const std::map<std::string, Purpose> kPurposes = {{"visibility", Purpose::kVisibility},
+                                                  {"ao", Purpose::kAo},
+                                                  {"diffuse", Purpose::kDiffuse},
+                                                  {"glossy", Purpose::kGlossy},
+                                                  {"all", Purpose::kAll}};
 
 // The options, by the groups of --help.
 void add_main_options(CLI::App& app, Arguments& a) {
@@ -83,16 +90,15 @@ void add_main_options(CLI::App& app, Arguments& a) {
          "Rays answered wrongly at most, in per cent: the cheapest setting that keeps to it, of cells the "
          "point of the dial that balanced is; 0: as --preset says")
       ->check(CLI::Range(0.0, 100.0));
-  app.add_option("--max-size", a.max_size,
-                 "The largest file, as 20MB: where it would be larger, a coarser grid of cells; 0: any. With "
-                 "--instances of each asset")
-      ->transform(CLI::AsSizeValue(true));
-  app.add_option("--for", a.purpose, "What the file is for: what nobody needs then is left out")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, Purpose>{{"visibility", Purpose::kVisibility},
-                                                                         {"ao", Purpose::kAo},
-                                                                         {"diffuse", Purpose::kDiffuse},
-                                                                         {"glossy", Purpose::kGlossy},
-                                                                         {"all", Purpose::kAll}}))
+  add_size_option(
+      app, "--max-size", a.max_size,
+      "The largest file, as 20MB: where it would be larger, a coarser grid of cells; 0: any. With "
+      "--instances of each asset",
+      true);
+  app.add_option_function<std::string>(
+         "--for", [&a](const std::string& word) { a.purpose = kPurposes.at(word); },
+         "What the file is for: what nobody needs then is left out")
+      ->check(CLI::IsMember(kPurposes))
       ->default_str("all");
   app.add_option("--compress", a.compress,
                  "Pack the sections: a smaller file, which is unpacked into memory and not mapped")
@@ -160,10 +166,10 @@ void add_machine_options(CLI::App& app, Arguments& a) {
   app.add_option("--align", a.align, "Alignment of sections in bytes; 0: 4096, of the smallest files 256")
       ->check(CLI::IsMember({0, 256, 4096, 65536}));
   app.add_option("--threads", a.threads, "Threads, 0: all cores");
-  app.add_option("--memory-limit", a.memory_limit,
-                 "Memory the bake may use, as 2GiB; Line Spaces beyond it wait in temporary files beside the "
-                 "output; 0: no limit")
-      ->transform(CLI::AsSizeValue(false));
+  add_size_option(
+      app, "--memory-limit", a.memory_limit,
+      "Memory the bake may use, as 2GiB; Line Spaces beyond it wait in temporary files beside the "
+      "output; 0: no limit");
   app.add_option("--shard", a.shard,
                  "Bake share I of K of the cells, I from 1, and write it to -o as a part; lsp-merge joins "
                  "all K, from as "

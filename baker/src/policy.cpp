@@ -77,6 +77,9 @@ void check(const Arguments& a) {
     throw Failure(Exit::kUsage, "",
                   "--shard divides the cells of --base cells: leave out --base " + a.base +
                       " and what is of Line Spaces, or bake in one, without --shard");
+  if (!a.shard.empty() && a.instances)
+    throw Failure(Exit::kUsage, "",
+                  "--shard divides one bake, and --instances makes one of each mesh: leave out either");
   if (!a.shard.empty() && a.max_size)
     throw Failure(Exit::kUsage, "",
                   "--max-size needs the whole bake, which no --shard has: choose the grid by --cells");

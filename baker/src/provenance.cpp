@@ -36,7 +36,7 @@ void write_depfile(const Arguments& a, const std::vector<std::vector<std::filesy
   for (const auto& files : sources) {
     for (const auto& file : files) rule += " \\\n  " + escaped(file);
   }
-  write_text(a.depfile, rule + "\n");
+  write_file(a.depfile, rule + "\n");
 }
 
 Json provenance(const Arguments& a, const Baked& baked, const Mesh& mesh,

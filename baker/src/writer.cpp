@@ -11,7 +11,6 @@
 
 #include "lsp/program.h"
 #include "lsp/sections.h"
-#include "temporary_file.h"
 
 namespace lsp {
 namespace {
@@ -165,7 +164,7 @@ uint64_t lsp_bytes(Baked& baked, const std::string& meta, const WriteOptions& op
   return baked.header.file_bytes;
 }
 
-Written write_lsp(TemporaryFile& file, Baked& baked, const std::string& meta, const WriteOptions& options) {
+Written write_lsp(OutputFile& file, Baked& baked, const std::string& meta, const WriteOptions& options) {
   const auto [sections, table, head] = lay_out(baked, meta, options);
   file.write(head.data(), head.size());
   Written written{baked.header.file_bytes, {}};
@@ -183,16 +182,10 @@ Written write_lsp(TemporaryFile& file, Baked& baked, const std::string& meta, co
 
 Written write_lsp(const std::filesystem::path& path, Baked& baked, const std::string& meta,
                   const WriteOptions& options) {
-  TemporaryFile file(path);
+  OutputFile file(path);
   const Written written = write_lsp(file, baked, meta, options);
   file.commit();
   return written;
-}
-
-void write_text(const std::filesystem::path& path, const std::string& text) {
-  TemporaryFile file(path);
-  file.write(text.data(), text.size());
-  file.commit();
 }
 
 }  // namespace lsp

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "bake.h"
-#include "temporary_file.h"
+#include "lsp/output_file.h"
 
 namespace lsp {
 
@@ -29,20 +29,15 @@ struct Written {
   std::vector<WrittenSection> sections;
 };
 
-// Completes `baked.header` (sizes, offsets, hashes) and writes the file. It is written beside `path` under
-// another name, synced and renamed: an interrupted or failed write leaves an older file at `path` whole.
-// `meta` is the provenance, UTF-8 JSON. Throws Failure with Exit::kFile, or
-// Exit::kLimit.
+// Completes `baked.header` (sizes, offsets, hashes) and writes an OutputFile. `meta` is the provenance, UTF-8
+// JSON. Throws Failure with Exit::kFile, or Exit::kLimit.
 Written write_lsp(const std::filesystem::path& path, Baked& baked, const std::string& meta,
                   const WriteOptions& options);
 
 // The same into a file that has its name only when it is committed, which is left to the caller.
-Written write_lsp(TemporaryFile& file, Baked& baked, const std::string& meta, const WriteOptions& options);
+Written write_lsp(OutputFile& file, Baked& baked, const std::string& meta, const WriteOptions& options);
 
 // How long that file will be, in bytes. Completes `baked.header`, too; packs where `options` say so.
 uint64_t lsp_bytes(Baked& baked, const std::string& meta, const WriteOptions& options);
-
-// Writes a small file of text in the same way.
-void write_text(const std::filesystem::path& path, const std::string& text);
 
 }  // namespace lsp

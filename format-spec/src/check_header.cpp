@@ -269,9 +269,11 @@ void check_identification(const FileView& view, Report& report) {
     return;
   }
   if (header.version_major != LSP_VERSION_MAJOR) {
-    LSP_HEADER_FINDING(
-        kOtherMajor, version_major,
-        "is " + std::to_string(header.version_major) + ": use a program that knows this version");
+    const bool older = header.version_major < LSP_VERSION_MAJOR;
+    LSP_HEADER_FINDING(kOtherMajor, version_major,
+                       "is " + std::to_string(header.version_major) + ": " +
+                           (older ? "bake it again, it is older than what this program reads"
+                                  : "use a program that knows this version"));
     return;
   }
   if (header.version_minor > LSP_VERSION_MINOR)

@@ -24,7 +24,8 @@ struct Descriptor {
 
 MappedFile::MappedFile(const std::filesystem::path& path) {
   const auto fail = [&](const std::string& what) -> void { throw Failure(Exit::kFile, path.string(), what); };
-  const Descriptor file{open(path.c_str(), O_RDONLY | O_CLOEXEC)};
+  // Non-blocking, or opening a pipe without a writer would wait for one.
+  const Descriptor file{open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)};
   if (file.fd < 0)
     fail(std::string("cannot be opened: ") + std::strerror(errno) + "; check the name and the permissions");
   struct stat status {};

@@ -306,9 +306,12 @@ Json summarize(std::span<const std::byte> file, const std::string& name, uint64_
   FileView view = view_file(file);
   Report report;
   check_identification(view, report);
-  if (report.verdict() == Verdict::kUnsupported)
+  if (report.verdict() == Verdict::kUnsupported) {
+    const Example& found = report.findings().begin()->second.examples.front();
+    const bool advised = found.message.find(": ") != std::string::npos;
     throw Failure(Exit::kUnsupported, name,
-                  "has a version or features that this program does not know: use a newer one");
+                  found.path + " " + found.message + (advised ? "" : ": use a newer program"));
+  }
   if (report.fatal()) {
     const std::string& found = report.findings().begin()->second.examples.front().message;
     throw Failure(Exit::kInvalid, name,
@@ -384,7 +387,7 @@ std::string summary_text(const Json& j, const std::string& section) {
     for (const Json& s : j["sections"])
       if (s["name"] == section)
         return head + section_line(s) + "  hash " + s["hash"].get<std::string>() + "\n";
-    throw Failure(Exit::kUsage, j["file"], "has no section " + section);
+    return "";
   }
   text += line("%s: format %s, %llu bytes%s\n", j["file"].get<std::string>().c_str(),
                j["format"].get<std::string>().c_str(), j["bytes"].get<unsigned long long>(),

@@ -7,7 +7,9 @@
 #include "annotate.h"
 #include "file.h"
 #include "lsp/command_line.h"
+#include "lsp/print_json.h"
 #include "summary.h"
+#include "view.h"
 
 namespace {
 
@@ -22,7 +24,18 @@ struct Arguments {
   uint64_t memory_limit = uint64_t{8} << 30;
 };
 
-std::string dump(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace); }
+// Throws where a section is asked for that is not there.
+void find_section(std::span<const std::byte> bytes, const Arguments& arguments) {
+  if (arguments.section.empty()) return;
+  std::string names;
+  for (const LspSection& section : view_file(bytes).table) {
+    const std::string name = type_name(section.type);
+    if (name == arguments.section) return;
+    names += (names.empty() ? "" : ", ") + name;
+  }
+  throw Failure(Exit::kUsage, arguments.file,
+                "has no section " + arguments.section + "; it has " + (names.empty() ? "none" : names));
+}
 
 void print_annotation(const Arguments& arguments, const CommonOptions& common,
                       std::span<const std::byte> bytes) {
@@ -43,22 +56,25 @@ void print_annotation(const Arguments& arguments, const CommonOptions& common,
     json["ranges"].push_back(
         {{"offset", range.offset}, {"bytes", range.bytes}, {"path", range.path}, {"meaning", range.meaning}});
   });
-  std::puts(dump(json).c_str());
+  print_json(json);
 }
 
 int show(const Arguments& arguments, const CommonOptions& common) {
   const MappedFile file(arguments.file);
   if (arguments.annotate) {
-    print_annotation(arguments, common, file.bytes());
+    find_section(file.bytes(), arguments);
+    if (common.json || !common.quiet) print_annotation(arguments, common, file.bytes());
     return 0;
   }
-  const Json summary = summarize(file.bytes(), arguments.file, arguments.memory_limit);
-  const std::string text =
-      summary_text(summary, arguments.section);  // refuses an unknown section in both forms
-  if (common.json)
-    std::puts(dump(summary).c_str());
-  else if (!common.quiet)
-    std::fputs(text.c_str(), stdout);
+  Json summary = summarize(file.bytes(), arguments.file, arguments.memory_limit);
+  find_section(file.bytes(), arguments);
+  if (common.json) {
+    Json& sections = summary["sections"];
+    for (size_t i = sections.size(); i-- > 0 && !arguments.section.empty();)
+      if (sections[i]["name"] != arguments.section) sections.erase(i);
+    print_json(summary);
+  } else if (!common.quiet)
+    std::fputs(summary_text(summary, arguments.section).c_str(), stdout);
   return 0;
 }
 
@@ -75,9 +91,8 @@ int main(int argc, char** argv) {
   app.add_flag("--annotate", arguments.annotate, "Print every byte range of the file with its meaning");
   app.add_option("--section", arguments.section,
                  "Only this section, as NODE; with --annotate: all its elements");
-  app.add_option("--memory-limit", arguments.memory_limit,
-                 "For the sections of a packed file, as in 512MB or 8GB")
-      ->transform(CLI::AsSizeValue(false));
+  add_size_option(app, "--memory-limit", arguments.memory_limit,
+                  "For the sections of a packed file, as in 512MB or 8GB");
   add_common_options(app, "lsp-info", common);
   arrange_help(app, "lsp-info room.lsp --annotate",
                {{"Options", {"FILE.lsp", "--annotate", "--section NAME", "--memory-limit"}}});

@@ -8,6 +8,7 @@
 #include "check.h"
 #include "file.h"
 #include "lsp/command_line.h"
+#include "lsp/print_json.h"
 #include "source.h"
 
 namespace {
@@ -32,7 +33,7 @@ const char* advice(Verdict verdict) {
     case Verdict::kInvalid:
       return "is not valid, do not use it: copy or bake it again";
     case Verdict::kUnsupported:
-      return "needs a newer program to be checked";
+      return "was not checked, it is of a version or has features that this program does not know";
     case Verdict::kLimit:
       return "was not checked in full: raise --memory-limit";
     case Verdict::kDiffer:
@@ -88,10 +89,6 @@ Outcome check_or_say_why(const std::string& path, const Arguments& arguments) {
   }
 }
 
-void print(const nlohmann::ordered_json& json) {
-  std::puts(json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace).c_str());
-}
-
 void print_last(const std::string& path, const Outcome& outcome) {
   if (!outcome.last.empty())
     std::fprintf(stderr, "lsp-validate: %s: %s\n", path.c_str(), outcome.last.c_str());
@@ -100,7 +97,7 @@ void print_last(const std::string& path, const Outcome& outcome) {
 int validate_one(const std::string& path, const Arguments& arguments, const CommonOptions& common) {
   const Outcome outcome = check(path, arguments);
   if (common.json)
-    print(outcome.json);
+    print_json(outcome.json);
   else if (!common.quiet)
     std::fputs(outcome.text.c_str(), stdout);
   print_last(path, outcome);
@@ -122,7 +119,7 @@ int validate_all(const Arguments& arguments, const CommonOptions& common) {
     files.push_back(outcome.json);
   }
   if (common.json)
-    print({{"program", "lsp-validate"}, {"version", kProgramVersion}, {"exit", exit}, {"files", files}});
+    print_json({{"program", "lsp-validate"}, {"version", kProgramVersion}, {"exit", exit}, {"files", files}});
   return exit;
 }
 
@@ -157,9 +154,8 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--mesh", arguments.meshes,
                  "The source files, in the order of the bake: is the bake stale?");
-  app.add_option("--memory-limit", arguments.memory_limit,
-                 "For the sections of a packed file, as in 512MB or 8GB")
-      ->transform(CLI::AsSizeValue(false));
+  add_size_option(app, "--memory-limit", arguments.memory_limit,
+                  "For the sections of a packed file, as in 512MB or 8GB");
   app.add_option("--examples", arguments.examples, "How many findings of a rule are printed")
       ->capture_default_str();
   app.add_flag("--rules", arguments.rules, "Print the rule catalogue as Markdown and end");

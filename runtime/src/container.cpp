@@ -35,12 +35,14 @@ lsp_status check_identity(const LspHeader& header, lsp_error* error) {
     return fail(error, LSP_ERROR_INVALID, 0,
                 "is a part of a bake; lsp-merge makes an .lsp file of all parts");
   if (header.magic_0 != LSP_MAGIC_0 || header.magic_1 != LSP_MAGIC_1) {
-    return fail(error, LSP_ERROR_INVALID, 0, "is not an .lsp file (its first eight bytes are others)");
+    return fail(error, LSP_ERROR_INVALID, 0,
+                "is not an .lsp file (its first eight bytes are others); lsp-bake makes one of a mesh");
   }
   if (header.version_major != LSP_VERSION_MAJOR) {
     return fail(error, LSP_ERROR_UNSUPPORTED, offsetof(LspHeader, version_major),
-                "has format version %u.%u, this library reads %u.x; bake it again", header.version_major,
-                header.version_minor, LSP_VERSION_MAJOR);
+                "has format version %u.%u, this library reads %u.x; %sbake it again", header.version_major,
+                header.version_minor, LSP_VERSION_MAJOR,
+                header.version_major > LSP_VERSION_MAJOR ? "use a newer one, or " : "");
   }
   if (const uint32_t unknown = header.required_features & ~LSP_FEATURES_KNOWN; unknown != 0) {
     return fail(error, LSP_ERROR_UNSUPPORTED, offsetof(LspHeader, required_features),
@@ -266,14 +268,15 @@ lsp_status read_container(const void* bytes, uint64_t size, Container* container
     return fail(error, LSP_ERROR_INVALID, 0, "its bytes must be in memory at a multiple of 16");
   }
   if (size < sizeof(LspHeader)) {
-    return fail(error, LSP_ERROR_INVALID, size, "is %llu bytes long, shorter than a header",
+    return fail(error, LSP_ERROR_INVALID, size,
+                "is %llu bytes long, shorter than a header; copy or bake it again",
                 static_cast<unsigned long long>(size));
   }
   const LspHeader& header = *static_cast<const LspHeader*>(bytes);
   if (const lsp_status status = check_identity(header, error); status != LSP_OK) return status;
   if (header.file_bytes != size) {
     return fail(error, LSP_ERROR_INVALID, offsetof(LspHeader, file_bytes),
-                "is %llu bytes long, its header states %llu; it was %s",
+                "is %llu bytes long, its header states %llu; it was %s: copy or bake it again",
                 static_cast<unsigned long long>(size), static_cast<unsigned long long>(header.file_bytes),
                 size < header.file_bytes ? "cut" : "extended");
   }

@@ -23,7 +23,8 @@ struct SystemMessage {
 extern "C" lsp_status lsp_map_file(const char* path, lsp_mapping* mapping, lsp_error* error) {
   mapping->bytes = nullptr;
   mapping->size = 0;
-  const int file = open(path, O_RDONLY | O_CLOEXEC);
+  // Non-blocking, or opening a pipe without a writer would wait for one.
+  const int file = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (file < 0) {
     const SystemMessage why(errno);
     return lsp::fail(error, LSP_ERROR_FILE, 0, "cannot be opened (%s); check the path and its permissions",

@@ -2,12 +2,12 @@
 
 #include <cerrno>
 #include <cstring>
-#include <utility>
 
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "lsp/output_file.h"
 #include "lsp/program.h"
 
 namespace lsp {
@@ -16,15 +16,14 @@ namespace {
 // A file descriptor that closes itself.
 class File {
  public:
-  File(const std::string& path, int flags) : handle_(open(path.c_str(), flags | O_CLOEXEC, 0666)) {}
-  ~File() { close_now(); }
+  // Non-blocking, or opening a pipe without a writer would wait for one.
+  explicit File(const std::string& path) : handle_(open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {}
+  ~File() {
+    if (handle_ >= 0) close(handle_);
+  }
   File(const File&) = delete;
   File& operator=(const File&) = delete;
   int handle() const { return handle_; }
-  bool close_now() {
-    const int handle = std::exchange(handle_, -1);
-    return handle < 0 || close(handle) == 0;
-  }
 
  private:
   int handle_;
@@ -37,7 +36,7 @@ class File {
 }  // namespace
 
 std::vector<LspRay> read_rays(const std::string& path) {
-  const File file(path, O_RDONLY);
+  const File file(path);
   if (file.handle() < 0) fail(path, "cannot be opened", "check the path and its permissions");
   struct stat status {};
   if (fstat(file.handle(), &status) != 0) fail(path, "cannot be read", "check the file");
@@ -62,26 +61,7 @@ std::vector<LspRay> read_rays(const std::string& path) {
 }
 
 void write_hits(const std::string& path, std::span<const LspHit> hits) {
-  const std::string temporary = path + ".tmp" + std::to_string(getpid());
-  try {
-    File file(temporary, O_WRONLY | O_CREAT | O_TRUNC);
-    if (file.handle() < 0)
-      fail(path, "cannot be created", "check that its folder is there and can be written");
-    for (size_t done = 0; done < hits.size_bytes();) {
-      const ssize_t got =
-          write(file.handle(), reinterpret_cast<const char*>(hits.data()) + done, hits.size_bytes() - done);
-      if (got < 0 && errno == EINTR) continue;
-      if (got < 0) fail(path, "cannot be written", "check the space on its disk");
-      done += static_cast<size_t>(got);
-    }
-    if (fsync(file.handle()) != 0 || !file.close_now())
-      fail(path, "cannot be written", "check the space on its disk");
-    if (rename(temporary.c_str(), path.c_str()) != 0)
-      fail(path, "cannot be put in place", "check its folder");
-  } catch (...) {
-    unlink(temporary.c_str());
-    throw;
-  }
+  write_file(path, {reinterpret_cast<const char*>(hits.data()), hits.size_bytes()});
 }
 
 }  // namespace lsp

@@ -12,8 +12,7 @@ namespace lsp {
 // Throws Failure: kFile where the file cannot be read, kInvalid where its size is not a multiple of 32.
 std::vector<LspRay> read_rays(const std::string& path);
 
-// Writes to a temporary beside `path`, syncs it and renames it: `path` has all hits or is as it was before.
-// Throws Failure(kFile).
+// An OutputFile: `path` has all hits or is as it was before. Throws Failure(kFile).
 void write_hits(const std::string& path, std::span<const LspHit> hits);
 
 }  // namespace lsp

@@ -10,6 +10,8 @@
 #include "lsp/command_line.h"
 #include "lsp/in_chunks.hpp"
 #include "lsp/instanced_scene.hpp"
+#include "lsp/output_file.h"
+#include "lsp/print_json.h"
 #include "lsp/scene_file.hpp"
 #include "lsp/trace_arguments.hpp"
 #include "ray_files.h"
@@ -211,7 +213,13 @@ void print(const nlohmann::ordered_json& json) {
 }
 
 Exit run(const Options& options) {
+  const std::filesystem::path inputs[] = {options.file, options.rays};
+  check_output(options.hits, inputs);
   const Scene scene(options.file);
+  if (scene.instanced() != nullptr) {
+    const auto& assets = scene.instanced()->asset_paths();
+    check_output(options.hits, std::vector<std::filesystem::path>(assets.begin(), assets.end()));
+  }
   const std::vector<LspRay> rays = read_rays(options.rays);
   std::vector<LspHit> hits(rays.size());
   const TraceRequest request = make_request(options, scene);
@@ -219,6 +227,9 @@ Exit run(const Options& options) {
     const bool approximate = (request.options.flags & LSP_TRACE_APPROXIMATE) != 0;
     for (const std::string& note : unused_arguments(options.trace, approximate, scene.headers()))
       std::cerr << "lsp-trace: " << options.file << ": " << note << "\n";
+    if (approximate && !scene.any_has(LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS))
+      std::cerr << "lsp-trace: " << options.file
+                << ": neither Line Spaces nor cells in the file: approximate rays are exact\n";
   }
   nlohmann::ordered_json json;
   try {
@@ -229,7 +240,7 @@ Exit run(const Options& options) {
   }
   write_hits(options.hits, hits);
   if (options.common.json) {
-    std::cout << json.dump(2) << "\n";
+    print_json(json);
   } else if (!options.common.quiet) {
     print(json);
   }

@@ -6,8 +6,9 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "../output_file.h"
 #include "lsp/command_line.h"
+#include "lsp/output_file.h"
+#include "lsp/print_json.h"
 #include "page.h"
 
 namespace lsp::sample {
@@ -73,7 +74,7 @@ int main(int argc, char** argv) {
                               read_file(folder + "/difference.png")};
       write_file(output, make_page(figures, pictures));
       if (common.json) {
-        std::cout << nlohmann::json{{"report", output}}.dump() << "\n";
+        print_json({{"report", output}});
       } else if (!common.quiet) {
         std::cout << make_summary(figures) << "report: " << output << "\n";
       }

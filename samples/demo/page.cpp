@@ -362,10 +362,11 @@ std::string make_summary(const Figures& f) {
   };
   line("exact:      ", f.exact);
   line("approximate:", f.approximate);
-  text += format(
-      "difference:  %.2f times the rays a second; PSNR %s, mean error %.2f %%, %.2f %% of pixels visibly\n",
-      speed_up(f, f.approximate), psnr(f.compare).c_str(), 100 * number(f.compare, "relative_mean"),
-      100 * number(f.compare, "pixels_over_5_percent"));
+  text +=
+      format("difference:  %.2f times the rays a second; %s, mean error %.2f %%, %.2f %% of pixels visibly\n",
+             speed_up(f, f.approximate),
+             (f.compare.at("psnr_db").is_null() ? "equal pictures" : "PSNR " + psnr(f.compare)).c_str(),
+             100 * number(f.compare, "relative_mean"), 100 * number(f.compare, "pixels_over_5_percent"));
   // Settings that are qualities.
   std::string qualities;
   for (const Figures::Setting& s : f.curve) {

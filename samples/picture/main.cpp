@@ -4,6 +4,8 @@
 
 #include "compare.h"
 #include "lsp/command_line.h"
+#include "lsp/output_file.h"
+#include "lsp/print_json.h"
 
 int main(int argc, char** argv) {
   using namespace lsp;
@@ -26,6 +28,8 @@ int main(int argc, char** argv) {
   arrange_help(app, "lsp-compare exact.pfm approximate.pfm -o difference.png",
                {{"Options", {"REFERENCE.pfm", "TEST.pfm", "--output FILE", "--factor", "--max-rmse"}}});
   return run_program(kProgram, app, argc, argv, [&] {
+    const std::filesystem::path inputs[] = {reference_path, test_path};
+    if (!output.empty()) check_output(output, inputs);
     const Picture reference = read_pfm(reference_path);
     const Picture test = read_pfm(test_path);
     const Comparison c = compare(reference, test);
@@ -43,7 +47,7 @@ int main(int argc, char** argv) {
       // JSON has no infinity; equal pictures have no PSNR.
       json["psnr_db"] =
           std::isfinite(c.psnr_db) ? nlohmann::ordered_json(c.psnr_db) : nlohmann::ordered_json();
-      std::cout << json.dump(2) << "\n";
+      print_json(json);
     } else if (!common.quiet) {
       std::cout << "RMSE " << c.rmse << ", mean absolute " << c.mean_absolute << " (" << 100 * c.relative_mean
                 << " % of the mean), PSNR " << c.psnr_db << " dB, " << 100 * far_share

@@ -7,8 +7,8 @@
 #include <fstream>
 #include <sstream>
 
+#include "lsp/output_file.h"
 #include "lsp/program.h"
-#include "output_file.h"
 
 #define STB_IMAGE_WRITE_IMPLEMENTATION
 #define STB_IMAGE_WRITE_STATIC

@@ -2,8 +2,9 @@
 #include <chrono>
 #include <nlohmann/json.hpp>
 
-#include "../output_file.h"
 #include "lsp/command_line.h"
+#include "lsp/output_file.h"
+#include "lsp/print_json.h"
 #include "scene.h"
 
 int main(int argc, char** argv) {
@@ -24,6 +25,7 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(uint64_t{1000}, uint64_t{20'000'000}));
   app.add_flag("--no-masks", no_masks, "Leave out the masks of leaves: cards are then solid");
   return run_program(kProgram, app, argc, argv, [&] {
+    check_output(output);
     const auto start = std::chrono::steady_clock::now();
     Scene scene = make_scene(name, triangles == 0 ? Detail{} : detail_for(name, triangles));
     if (no_masks) take_masks_off(scene);
@@ -31,16 +33,14 @@ int main(int argc, char** argv) {
     write_file(output, bytes);
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
     if (common.json) {
-      std::cout << nlohmann::ordered_json{{"file", output},
-                                          {"scene", name},
-                                          {"triangles", triangle_count(scene)},
-                                          {"meshes", scene.meshes.size()},
-                                          {"nodes", scene.nodes.size()},
-                                          {"materials", scene.materials.size()},
-                                          {"bytes", bytes.size()},
-                                          {"seconds", seconds.count()}}
-                       .dump(2)
-                << "\n";
+      print_json({{"file", output},
+                  {"scene", name},
+                  {"triangles", triangle_count(scene)},
+                  {"meshes", scene.meshes.size()},
+                  {"nodes", scene.nodes.size()},
+                  {"materials", scene.materials.size()},
+                  {"bytes", bytes.size()},
+                  {"seconds", seconds.count()}});
     } else if (!common.quiet) {
       std::cout << output << ": " << name << ", " << triangle_count(scene) << " triangles in "
                 << scene.meshes.size() << " meshes and " << scene.nodes.size() << " nodes, " << bytes.size()

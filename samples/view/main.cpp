@@ -13,8 +13,9 @@
 #include "exposure_meter.h"
 #include "lsp/command_line.h"
 #include "lsp/instanced_scene.hpp"
+#include "lsp/output_file.h"
+#include "lsp/print_json.h"
 #include "lsp/trace_arguments.hpp"
-#include "output_file.h"
 #include "picture.h"
 #include "renderer.h"
 
@@ -154,21 +155,19 @@ void report(const ViewReport& r, const ViewState& state, const Arguments& argume
                                   {"steps", r.steps[part]}};
   };
   if (common.json) {
-    std::cout << nlohmann::ordered_json{{"file", arguments.file},
-                                        {"device", gpu.properties.deviceName},
-                                        {"effect", kEffects[state.effect]},
-                                        {"split", state.split},
-                                        {"dial", dial_name(state.approximate, scene)},
-                                        {"exposure", state.exposure},
-                                        {"camera", to_string(state.camera)},
-                                        {"samples", r.samples},
-                                        {"exact", half(VIEW_EXACT)},
-                                        {"approximate", half(VIEW_APPROXIMATE)},
-                                        {"incomplete", r.incomplete},
-                                        {"screenshot", arguments.screenshot},
-                                        {"validation_messages", gpu.messages}}
-                     .dump(2)
-              << "\n";
+    print_json({{"file", arguments.file},
+                {"device", gpu.properties.deviceName},
+                {"effect", kEffects[state.effect]},
+                {"split", state.split},
+                {"dial", dial_name(state.approximate, scene)},
+                {"exposure", state.exposure},
+                {"camera", to_string(state.camera)},
+                {"samples", r.samples},
+                {"exact", half(VIEW_EXACT)},
+                {"approximate", half(VIEW_APPROXIMATE)},
+                {"incomplete", r.incomplete},
+                {"screenshot", arguments.screenshot},
+                {"validation_messages", gpu.messages}});
   } else if (!common.quiet) {
     std::printf("%s, %s\n%s\ncamera %s%s\n", arguments.file.c_str(), gpu.properties.deviceName,
                 figures(r, state, scene).c_str(), to_string(state.camera).c_str(), up_option(state.camera));
@@ -219,6 +218,7 @@ void say_notes(const Arguments& arguments, const CommonOptions& common, const Re
 void run(Arguments& arguments, const CommonOptions& common) {
   if (!arguments.screenshot.empty() && std::filesystem::path(arguments.screenshot).extension() != ".png")
     throw Failure(Exit::kUsage, arguments.screenshot, "screenshots are written as .png; choose such a name");
+  if (!arguments.screenshot.empty()) check_output(arguments.screenshot);
   if (!arguments.screenshot.empty() && arguments.frames == 0)
     throw Failure(Exit::kUsage, "", "--screenshot needs --frames, how many to render before it is taken");
   const glm::ivec2 size = parse_size(arguments.size);

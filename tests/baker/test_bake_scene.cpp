@@ -305,6 +305,8 @@ TEST_F(BakeScene, AFailedBakeChangesNothing) {
   EXPECT_EQ(run("lsp-bake", "small.obj missing.obj --instances -o scene.json"), 2);
   EXPECT_EQ(run("lsp-bake", "small.obj --instances -o scene.lsp"), 1);
   EXPECT_NE(read("err").find("lsp-bake: scene.lsp: is no scene"), std::string::npos) << read("err");
+  EXPECT_EQ(run("lsp-bake", "small.obj --instances --shard 1/2 -o scene.json"), 1);
+  EXPECT_NE(read("err").find("--shard divides one bake"), std::string::npos) << read("err");
   EXPECT_EQ(run("lsp-bake", "small.obj -o scene.json"), 1);
   EXPECT_NE(read("err").find("add --instances"), std::string::npos) << read("err");
   EXPECT_EQ(files(), before);

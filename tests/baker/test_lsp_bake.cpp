@@ -229,6 +229,49 @@ TEST_F(LspBake, ExitsAsTheErrorIs) {
   EXPECT_EQ(run("--help"), 0);
 }
 
+TEST_F(LspBake, NumbersThatAreNoneAreRefused) {
+  for (const std::string wrong : {"--max-size -5", "--memory-limit -1", "--crease-angle nan",
+                                  "--max-error nan", "--plane-tolerance nan", "--threads -1", "--for 2"})
+    EXPECT_EQ(run("grid.obj -o a.lsp " + wrong), 1) << wrong;
+  EXPECT_EQ(run("grid.obj -o a.lsp --for shadows"), 1);
+  EXPECT_NE(read("err").find("shadows not in {all,ao,diffuse,glossy,visibility}"), std::string::npos)
+      << read("err");
+  EXPECT_FALSE(fs::exists(folder_ / "a.lsp"));
+}
+
+TEST_F(LspBake, WhatIsReadIsNotOverwritten) {
+  const std::string mesh = "mtllib a.mtl\nusemtl x\n" + read("grid.obj"), material = "newmtl x\nKd 1 0 0\n";
+  std::ofstream(folder_ / "a.obj") << mesh;
+  std::ofstream(folder_ / "a.mtl") << material;
+  for (const std::string output :
+       {"-o a.obj", "-o ./a.mtl", "-o a.lsp --depfile a.obj", "-o a.lsp --depfile a.mtl",
+        "-o a.lsp --depfile a.lsp", "-o a.lsp --depfile ./a.lsp"}) {
+    EXPECT_EQ(run("a.obj --base wide " + output), 1) << output;
+    EXPECT_NE(read("err"), "") << output;
+    EXPECT_EQ(read("a.obj"), mesh) << output;
+    EXPECT_EQ(read("a.mtl"), material) << output;
+    EXPECT_FALSE(fs::exists(folder_ / "a.lsp")) << output;
+  }
+}
+
+TEST_F(LspBake, NamesNeedNotBeUtf8) {
+  fs::copy_file(folder_ / "grid.obj", folder_ / "l\xE4n.obj");
+  ASSERT_EQ(run("'l\xE4n.obj' -o 'l\xE4n.lsp' --base wide --json"), 0) << read("err");
+  EXPECT_EQ(nlohmann::json::parse(read("out"))["output"], "l\xEF\xBF\xBDn.lsp");
+  EXPECT_EQ(shell("lsp-validate 'l\xE4n.lsp' --mesh 'l\xE4n.obj'", folder_), 0);
+}
+
+// A device that cannot be replaced is written to, and what was printed has come out or is no success.
+TEST_F(LspBake, AFullDeviceIsAnError) {
+  fs::create_symlink("/dev/full", folder_ / "full");
+  EXPECT_EQ(run("grid.obj -o full --base wide"), 2);
+  EXPECT_TRUE(fs::is_symlink(folder_ / "full"));
+  EXPECT_EQ(run("grid.obj -o a.lsp --base wide --depfile full"), 2);
+  EXPECT_FALSE(fs::exists(folder_ / "a.lsp"));
+  for (const std::string arguments : {"--help", "--version", "grid.obj -o a.lsp --base wide"})
+    EXPECT_EQ(shell("lsp-bake " + arguments + " >/dev/full 2>err", folder_), 2) << arguments;
+}
+
 TEST_F(LspBake, FilesAreNoLongerThanAskedFor) {
   const auto grid_of = [&](const char* file) {
     EXPECT_EQ(shell(std::string("lsp-info --json ") + file + " >info", folder_), 0);

@@ -7,8 +7,8 @@
 #include <fstream>
 #include <memory>
 
+#include "lsp/output_file.h"
 #include "lsp/program.h"
-#include "output_file.h"
 
 namespace lsp::bench {
 namespace {
@@ -82,7 +82,7 @@ Json find_bake(const fs::path& bake, const std::string& key) {
 void remember_bake(const fs::path& bake, const std::string& key, Json record) {
   record["key"] = key;
   record["file_bytes"] = fs::file_size(bake);
-  sample::write_file(record_of(bake), record.dump(1) + "\n");
+  write_file(record_of(bake), record.dump(1) + "\n");
 }
 
 }  // namespace lsp::bench

@@ -9,6 +9,7 @@
 #include "context.h"
 #include "lsp/command_line.h"
 #include "lsp/in_chunks.hpp"
+#include "lsp/print_json.h"
 #include "machine.h"
 #include "timing.h"
 
@@ -121,11 +122,13 @@ class RunningReport {
 
 void add_scenes(Context& context, const Arguments& arguments) {
   for (const std::string& scene : arguments.scenes) {
-    if (!std::filesystem::exists(scene)) throw Failure(Exit::kFile, scene, "does not exist");
+    if (!std::filesystem::exists(scene)) throw Failure(Exit::kFile, scene, "does not exist; check the path");
   }
   std::error_code error;
   std::filesystem::create_directories(context.cache, error);
-  if (error) throw Failure(Exit::kFile, context.cache.string(), "cannot be made: " + error.message());
+  if (error)
+    throw Failure(Exit::kFile, context.cache.string(),
+                  "cannot be made: " + error.message() + "; give another folder with -o");
   for (const std::string& scene : arguments.scenes) {
     context.progress("bake " + scene);
     try {
@@ -190,7 +193,7 @@ void run(const Arguments& arguments, const CommonOptions& common) {
   const Report& report = running.report();
   if (show) std::cerr << "\r\033[K";
   if (common.json) {
-    std::cout << to_json(report).dump(1) << "\n";
+    print_json(to_json(report));
   } else if (!common.quiet) {
     for (const std::string& answer : report.answers) std::cout << answer << "\n";
     for (const std::string& warning : report.warnings) std::cout << "warning: " << warning << "\n";

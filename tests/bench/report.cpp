@@ -4,15 +4,14 @@
 #include <cstdio>
 
 #include "html_text.h"
+#include "lsp/output_file.h"
 #include "lsp/program.h"
-#include "output_file.h"
 
 namespace lsp::bench {
 namespace {
 
 using sample::base64;
 using sample::escape_html;
-using sample::write_file;
 
 constexpr const char* kStyle = R"(
 :root{color-scheme:light dark;--line:#8884;--soft:#8881}

@@ -1,6 +1,7 @@
 // What lsp-validate --json prints is what report.schema.json describes, for every file of the corpus: the
 // program itself is run, so that its exit codes and streams are tested too.
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 
 #include <algorithm>
@@ -12,6 +13,7 @@
 
 #include "mutations.h"
 #include "scenes.h"
+#include "temporary_folder.h"
 
 namespace {
 
@@ -147,9 +149,36 @@ TEST(Program, ExitCodes) {
   EXPECT_EQ(run(info + " --annotate " + valid).exit, 0);
   EXPECT_EQ(run(info + " --section NODE " + valid).exit, 0);
   EXPECT_EQ(run(info + " --section NONE " + valid).exit, 1);
+  EXPECT_EQ(run(info + " --annotate --section NONE " + valid).exit, 1);
+  EXPECT_EQ(run(info + " --annotate --section NODE " + valid).exit, 0);
+  EXPECT_EQ(run(validate + " --memory-limit -1 " + valid).exit, 1);
   EXPECT_EQ(run(info + " " + (kCorpus / "index.json").string()).exit, 3);
   EXPECT_EQ(run(info + " " + (kCorpus / "invalid/LSP-0104-other-major.lsp").string()).exit, 5);
   EXPECT_EQ(run(info + " /no/such/file.lsp").exit, 2);
+  EXPECT_EQ(run(info + " --quiet " + valid).out + run(info + " --quiet --annotate " + valid).out, "");
+  const Json one = Json::parse(run(info + " --json --section NODE " + valid).out, nullptr, false);
+  ASSERT_EQ(one["sections"].size(), 1u);
+  EXPECT_EQ(one["sections"][0]["name"], "NODE");
+  const lsp::test::TemporaryFolder folder;
+  ASSERT_EQ(mkfifo((folder.path() / "pipe").c_str(), 0600), 0);  // nobody writes to it
+  for (const std::string& program : {validate, info})
+    EXPECT_EQ(run(program + " " + (folder.path() / "pipe").string()).exit, 2) << program;
+}
+
+// An older version is one to bake again, not one to look for a newer program for.
+TEST(Program, AFileOfVersion1IsRefusedByThatName) {
+  const lsp::test::TemporaryFolder folder;
+  const std::string path = (folder.path() / "one.lsp").string();
+  std::string bytes = lsp::test::read_bytes(kCorpus / "valid/full.lsp");
+  bytes[8] = 1;  // version_major
+  std::ofstream(path, std::ios::binary) << bytes;
+  for (const std::string program : {LSP_VALIDATE, LSP_INFO}) {
+    const Output output = run("(" + program + " " + path + " 2>&1)");
+    EXPECT_EQ(output.exit, 5) << program;
+    EXPECT_NE(output.out.find("/header/version_major"), std::string::npos) << output.out;
+    EXPECT_NE(output.out.find("is 1: bake it again"), std::string::npos) << output.out;
+    EXPECT_EQ(output.out.find("newer"), std::string::npos) << output.out;
+  }
 }
 
 }  // namespace

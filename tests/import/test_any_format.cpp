@@ -83,6 +83,21 @@ TEST_F(AnyFormat, FarFromTheOriginTheMeshHasOneOfItsOwn) {
   }
 }
 
+// Two houses a thousand kilometres apart have no origin that serves both.
+TEST_F(AnyFormat, TrianglesThatSinglePrecisionBendsAreNoted) {
+  const std::string near = "v 0 0 0\nv 100 0 0\nv 0 100 0\nf -3 -2 -1\n";
+  const auto far = [](const char* edge) {
+    const std::string x = "v 5400000.125 ", moved = "v 540000" + std::string(edge);
+    return x + "0 0\n" + moved + " 0 0\n" + x + "1 0\nf -3 -2 -1\n";
+  };
+  const Mesh bent = import("a.obj", near + far("1.25"));
+  EXPECT_EQ(bent.origin, glm::dvec3(0));
+  EXPECT_EQ(bent.triangles.size(), 2u);
+  ASSERT_EQ(bent.notes.size(), 1u);
+  EXPECT_EQ(bent.notes[0].find("1 triangles keep little of their shape"), 0u) << bent.notes[0];
+  EXPECT_TRUE(import("b.obj", near + far("5.125")).notes.empty()) << "0.125 of 5";
+}
+
 TEST_F(AnyFormat, AnOriginOnlyWhereItIsNeeded) {
   const auto triangle_at = [&](const std::string& x, const std::string& x1) {
     return import("a.obj", "v " + x + " 0 0\nv " + x1 + " 0 0\nv " + x + " 1 0\nf 1 2 3\n");

@@ -197,6 +197,7 @@ TEST_F(GltfVariants, NodesMalformedOrWithTwoPlaces) {
       {{{"matrix", {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0}}}, "matrix of a node is not 16 numbers"},
       {{{"translation", {1, 2}}}, "translation of a node is not 3 numbers"},
       {{{"rotation", {0, 0, 0}}}, "rotation of a node is not 4 numbers"},
+      {{{"rotation", {0, 0, 0, 0}}}, "rotation of a node is four zeros"},
       {{{"matrix", {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}}, {"scale", {2, 2, 2}}},
        "scale of a node that has a matrix is not read"}};
   for (const auto& [members, part] : cases) {

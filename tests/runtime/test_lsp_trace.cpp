@@ -1,5 +1,6 @@
 // lsp-trace as its users run it: options, files, figures and exit codes.
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <cstring>
 #include <filesystem>
@@ -125,10 +126,18 @@ TEST_F(LspTrace, ExitCodes) {
   EXPECT_EQ(run(""), 1);
   EXPECT_EQ(run("raw.lsp"), 1);
   EXPECT_EQ(run("raw.lsp --mode sideways" + files("rays.bin", "h")), 1);
+  for (const std::string number : {"--max-loss nan", "--lod nan", "--max-loss -1", "--threads -1"})
+    EXPECT_EQ(run("raw.lsp " + number + files("rays.bin", "h")), 1) << number;
+  EXPECT_EQ(run("raw.lsp" + files("rays.bin", "rays.bin")), 1) << "the rays would be lost";
+  EXPECT_EQ(run("raw.lsp" + files("rays.bin", "./raw.lsp")), 1) << "the scene would be lost";
+  EXPECT_EQ(read_bytes(folder_ / "raw.lsp").size(), raw_.size());
   EXPECT_EQ(run("missing.lsp" + files("rays.bin", "h")), 2);
   EXPECT_EQ(err().rfind("lsp-trace: missing.lsp: ", 0), 0u) << err();
   EXPECT_EQ(run("raw.lsp" + files("missing.bin", "h")), 2);
   EXPECT_EQ(run("raw.lsp" + files("rays.bin", "no/such/folder/h")), 2);
+  ASSERT_EQ(mkfifo((folder_ / "pipe").c_str(), 0600), 0);  // nobody writes to it
+  EXPECT_EQ(run("raw.lsp" + files("pipe", "h")), 2);
+  EXPECT_EQ(run("pipe" + files("rays.bin", "h")), 2);
   EXPECT_EQ(run("raw.lsp" + files("odd.bin", "h")), 3);
   EXPECT_EQ(run("cut.lsp" + files("rays.bin", "h")), 3);
   EXPECT_FALSE(fs::exists(folder_ / "h"));
@@ -144,8 +153,11 @@ TEST_F(LspTrace, FilesWithoutWhatIsAskedFor) {
   const Bytes exact = write_raw(build_parts(options));
   write("exact.lsp", exact.data(), exact.size());
   EXPECT_EQ(run(std::string("exact.lsp") + kFiles), 0) << err();  // exact by itself
-  EXPECT_EQ(run(std::string("exact.lsp --mode approximate") + kFiles), 0)
-      << err();  // nothing to approximate with
+  EXPECT_EQ(err(), "");
+  EXPECT_EQ(run(std::string("exact.lsp --mode approximate") + kFiles), 0) << err();
+  EXPECT_NE(err().find("exact.lsp: neither Line Spaces nor cells in the file: approximate rays are exact"),
+            std::string::npos)
+      << err();
   options.line_spaces = true;
   options.exact = false;
   const Bytes approximate = write_raw(build_parts(options));
@@ -199,6 +211,8 @@ TEST_F(LspTrace, InstancesOfSeveralFiles) {
   const std::string empty = R"({"lsp_scene": 1, "assets": [], "instances": []})";
   write("empty.json", empty.data(), empty.size());
   EXPECT_EQ(run(std::string("empty.json") + kFiles), 0) << err();
+  EXPECT_EQ(run("scene.json --rays rays.bin --hits ./packed.lsp"), 1) << "an asset would be lost";
+  EXPECT_EQ(read_bytes(folder_ / "packed.lsp").substr(1, 3), "LSP");
 }
 
 TEST_F(LspTrace, VulkanTracesInstances) {

@@ -76,6 +76,7 @@ TEST(Page, SaysTheFigures) {
   EXPECT_NE(summary.find("1.50 times"), std::string::npos);
   EXPECT_NE(summary.find("skipped:     empty shafts"), std::string::npos);
   EXPECT_NE(summary.find("note:        a <note>"), std::string::npos);
+  EXPECT_NE(summary.find("a second; equal pictures, mean"), std::string::npos) << summary;
 }
 
 TEST(Page, TellsOfCellsAndTheirDial) {

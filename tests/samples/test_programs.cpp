@@ -284,6 +284,12 @@ TEST_F(Programs, RaysToLightsHaveAQualityOfTheirOwn) {
     EXPECT_NE(test::read_bytes(file("notes.txt")).find("--light-quality does nothing"), std::string::npos)
         << elsewhere;
   }
+  ASSERT_EQ(test::shell("lsp-render " + file("atrium.lsp") + " -o " + file("x.pfm") +
+                        " --size 8x8 --mode approximate --quality fast --max-loss 1 >/dev/null 2> " +
+                        file("notes.txt")),
+            0);
+  EXPECT_NE(test::read_bytes(file("notes.txt")).find("--quality does nothing: --max-loss sets the dial"),
+            std::string::npos);
 }
 
 // However large the picture, a device gets it in pieces of at most 131,072 pixels.

@@ -186,8 +186,12 @@ void collect_unread(const json& node, std::set<std::string>& parts) {
       {"matrix", 16}, {"translation", 3}, {"rotation", 4}, {"scale", 3}};
   double values[16];
   for (const auto& [key, size] : kSizes) {
+    values[3] = 1;  // where nothing is read
     if (!numbers_member(node, key, size, values))
       parts.insert(std::string(key) + " of a node is not " + std::to_string(size) + " numbers and not read");
+    if (size == 4 && !member(node, key).is_null() && values[0] == 0 && values[1] == 0 && values[2] == 0 &&
+        values[3] == 0)
+      parts.insert("a rotation of a node is four zeros, which turn nothing, and not read");
     if (has_matrix && size < 16 && !member(node, key).is_null())
       parts.insert(std::string(key) + " of a node that has a matrix is not read");
   }

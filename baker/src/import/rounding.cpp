@@ -16,6 +16,9 @@ constexpr double kDegenerateArea = 1e-14;
 // Of the scene's longest side: no vertex may be moved further.
 constexpr double kTolerance = 1e-6;
 
+// Of a triangle's longest edge: what it loses of its shape before it is said.
+constexpr double kBent = 0.1;
+
 double largest(const glm::dvec3& v) {
   return std::max(std::abs(v.x), std::max(std::abs(v.y), std::abs(v.z)));
 }
@@ -118,7 +121,7 @@ glm::dvec3 OriginChooser::origin() const {
   return glm::round((low_ + (high_ - low_) * 0.5) / step) * step;
 }
 
-void round_positions(const std::vector<glm::dvec3>& exact, Mesh& mesh) {
+uint64_t round_positions(const std::vector<glm::dvec3>& exact, Mesh& mesh) {
   mesh.positions.clear();
   mesh.positions.reserve(exact.size());
   bool inexact = false;
@@ -126,19 +129,33 @@ void round_positions(const std::vector<glm::dvec3>& exact, Mesh& mesh) {
     mesh.positions.push_back(rounded(p - mesh.origin) + 0.0f);
     inexact = inexact || glm::dvec3(mesh.positions.back()) != p - mesh.origin;
   }
-  if (!inexact) return;  // then what was welded and has an area still is and has
+  if (!inexact) return 0;  // then what was welded and has an area still is and has
+  const auto is_bent = [&](const glm::uvec3& triangle) {
+    double moved = 0, longest = 0;
+    for (int k = 0; k < 3; ++k) {
+      const glm::dvec3 &p = exact[triangle[k]], &next = exact[triangle[(k + 1) % 3]];
+      moved = std::max(moved, largest(p - mesh.origin - glm::dvec3(mesh.positions[triangle[k]])));
+      longest = std::max(longest, largest(next - p));
+    }
+    return moved > kBent * longest;
+  };
   bool any = false;
+  uint64_t bent = 0;
   std::vector<bool> gone(mesh.triangles.size(), false);
   for (size_t t = 0; t < gone.size(); ++t) {
     const glm::uvec3& i = mesh.triangles[t];
     gone[t] = is_degenerate(mesh.positions[i.x], mesh.positions[i.y], mesh.positions[i.z]);
-    if (!gone[t]) continue;
+    if (!gone[t]) {
+      bent += is_bent(i);
+      continue;
+    }
     ++(is_degenerate(exact[i.x], exact[i.y], exact[i.z]) ? mesh.rejected.degenerate
                                                          : mesh.rejected.collapsed);
     any = true;
   }
   if (any) remove_triangles(mesh, gone);
   weld(mesh);
+  return bent;
 }
 
 }  // namespace lsp

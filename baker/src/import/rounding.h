@@ -31,8 +31,9 @@ class OriginChooser {
 };
 
 // Fills mesh.positions with `exact` less mesh.origin, welds what became equal, and takes out triangles that
-// have no area any more (counted as collapsed).
-void round_positions(const std::vector<glm::dvec3>& exact, Mesh& mesh);
+// have no area any more (counted as collapsed). Returns how many of the others are bent: a corner is moved by
+// more than a tenth of their longest edge.
+uint64_t round_positions(const std::vector<glm::dvec3>& exact, Mesh& mesh);
 
 // Two equal corners, or an area below 1e-14 of the longest edge squared.
 bool is_degenerate(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c);

@@ -2,7 +2,6 @@
 #include <tbb/global_control.h>
 
 #include <cstdio>
-#include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -11,8 +10,9 @@
 #include "figures.h"
 #include "file.h"
 #include "lsp/command_line.h"
+#include "lsp/output_file.h"
+#include "lsp/print_json.h"
 #include "shard/join.h"
-#include "temporary_file.h"
 #include "timer.h"
 
 namespace {
@@ -90,7 +90,7 @@ MeasuredError finish(Baked& baked, PartSettings& settings, const std::string& fi
 }
 
 Exit run(const Arguments& a) {
-  check_folder(a.output);
+  check_output(a.output, a.parts);
   std::unique_ptr<tbb::global_control> control;
   if (a.threads)
     control = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism, a.threads);
@@ -129,7 +129,7 @@ Exit run(const Arguments& a) {
   bar.clear();
 
   if (a.common.json)
-    std::cout << report_json(a, done).dump(2) << "\n";
+    print_json(report_json(a, done));
   else if (!a.common.quiet)
     print_report(a, done);
   return Exit::kDone;

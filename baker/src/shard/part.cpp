@@ -5,9 +5,9 @@
 #include <cstring>
 #include <memory>
 
+#include "lsp/output_file.h"
 #include "lsp/program.h"
 #include "lsp/sections.h"
-#include "temporary_file.h"
 
 namespace lsp {
 namespace {
@@ -203,7 +203,7 @@ uint64_t write_part(const std::filesystem::path& path, Baked& baked, const Shard
   h.hash_lo = digest[0];
   h.hash_hi = digest[1];
 
-  TemporaryFile file(path);
+  OutputFile file(path);
   file.write(&h, sizeof h);
   file.write(&header, sizeof header);
   uint64_t position = sizeof h + sizeof header;

@@ -5,6 +5,8 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <iostream>
 #include <mutex>
@@ -37,24 +39,55 @@ inline void add_common_options(CLI::App& app, const char* program, CommonOptions
   app.add_flag("--json", options.json, "Print one JSON object on standard output");
 }
 
+// An option that is a number of bytes, as 512MB or 2GiB.
+inline CLI::Option* add_size_option(CLI::App& app, const std::string& name, uint64_t& bytes,
+                                    const std::string& description, bool kb_is_1000 = false) {
+  // CLI11 alone takes -1 for the largest number there is.
+  const auto refuse_negative = [](std::string& text) {
+    return text.find('-') == std::string::npos ? std::string() : text + " is no size";
+  };
+  return app.add_option(name, bytes, description)
+      ->transform(CLI::AsSizeValue(kb_is_1000))
+      ->transform(CLI::Validator(refuse_negative, ""));  // the last that is added is the first that runs
+}
+
+// What was printed has come out, or is no success.
+inline void check_standard_output() {
+  std::cout.flush();
+  if (!std::cout || std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
+    throw Failure(Exit::kFile, "standard output", "cannot be written, make room");
+}
+
+// CLI11 takes "nan" for a number, and for one in every range.
+inline void refuse_nan(const CLI::App& app) {
+  for (const CLI::Option* option : app.get_options()) {
+    if (!option->get_type_name().starts_with("FLOAT")) continue;
+    for (const std::string& text : option->results())
+      if (double value = 0; CLI::detail::lexical_cast(text, value) && std::isnan(value))
+        throw CLI::ValidationError(option->get_name(), text + " is no number");
+  }
+}
+
 // Parses, runs `body` and returns its exit code: that of the Exit or int it returns, 0 if it returns nothing.
 // Turns what is thrown into a message on standard error.
 template <typename Body>
 int run_program(const char* program, CLI::App& app, int argc, char** argv, Body&& body) {
   try {
-    app.parse(argc, argv);
+    try {
+      app.parse(argc, argv);
+    } catch (const CLI::Success& e) {  // --help, --version
+      app.exit(e);
+      check_standard_output();
+      return static_cast<int>(Exit::kDone);
+    }
+    refuse_nan(app);
     int exit = 0;
     if constexpr (std::is_void_v<decltype(body())>)
       body();
     else
       exit = static_cast<int>(body());
-    std::cout.flush();
-    if (!std::cout || std::fflush(stdout) != 0)
-      throw Failure(Exit::kFile, "standard output", "cannot be written, make room");
+    check_standard_output();
     return exit;
-  } catch (const CLI::Success& e) {  // --help, --version
-    app.exit(e);
-    return static_cast<int>(Exit::kDone);
   } catch (const CLI::ParseError& e) {
     std::cerr << program << ": " << e.what() << "; see " << program << " --help\n";
     return static_cast<int>(Exit::kUsage);

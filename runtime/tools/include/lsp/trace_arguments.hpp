@@ -78,6 +78,8 @@ inline std::vector<std::string> unused_arguments(const TraceArguments& a, bool a
   note(a.lod > 0, "--lod", false);
   note(!a.quality.empty(), "--quality", true);
   note(a.max_loss >= 0, "--max-loss", true);
+  if (approximate && cells && !a.quality.empty() && a.max_loss >= 0)
+    notes.push_back("--quality does nothing: --max-loss sets the dial");
   return notes;
 }
 
