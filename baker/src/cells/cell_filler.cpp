@@ -14,6 +14,7 @@
 #include "clip.h"
 #include "lsp/lsp.h"
 #include "lsp/program.h"
+#include "near_rays.h"
 
 namespace lsp {
 namespace {
@@ -28,13 +29,6 @@ struct Face {
   int axis, u, v, side;
   explicit Face(uint32_t face)
       : axis(int(face / 2)), u(axis == 0 ? 1 : 0), v(axis == 2 ? 1 : 2), side(int(face % 2)) {}
-};
-
-// The surface in a sub-cell as triangles, with their areas summed up.
-struct Surface {
-  std::vector<std::array<glm::vec3, 3>> pieces;
-  std::vector<glm::vec3> normals;
-  std::vector<float> area;
 };
 
 // The lines between a patch and all patches of another side. They share their places in the patches and their
@@ -320,26 +314,29 @@ class Filler {
     uint32_t entry;
   };
 
-  // Rays from the surface of a sub-cell as a renderer sends them, cosine-distributed from both sides, sorted
-  // by the patch of the cell through which they leave.
+  // By rays from the surface of a sub-cell, sorted by the patch of the cell through which they leave.
   void fill_sub_cell(const glm::vec3& lo, float edge, const Surface& surface, uint32_t sub) {
     const uint32_t m = scene_.options.origin_patches, entries = 6 * m * m;
     const uint32_t in_round = entries * scene_.options.origin_samples / kRounds;
     const Sequence<5> sequence(number_ * 64 + sub);
+    const SubCell at = {lo_, size_, lo, edge, m, scene_.offset};
     near_.clear();
     met_.assign(entries, {});
     for (uint32_t round = 0; round < kRounds; ++round) {
       const size_t first = near_.size();
       rays_.clear();
-      for (uint32_t i = round * in_round; i < (round + 1) * in_round; ++i)
-        add_near(surface, sequence(i), i % 2 != 0, lo, edge, m);
+      const uint32_t end = (round + 1) * in_round;
+      for (uint32_t i = round * in_round; i < end; i += NearRays::kMost) {
+        batch_.make(surface, sequence, i, at);
+        add_near(batch_, std::min<size_t>(NearRays::kMost, end - i));
+      }
       trace_near(first);
     }
     sort_near(entries);
-    size_t at = 0;
+    size_t begin = 0;
     for (const Entry& e : met_) {
-      out_.origin.push_back(entry_of(e, at));
-      at += e.count;
+      out_.origin.push_back(entry_of(e, begin));
+      begin += e.count;
     }
   }
 
@@ -398,50 +395,19 @@ class Filler {
     }
   }
 
-  // A ray from the surface, to near_ and rays_ unless its entry is settled.
-  void add_near(const Surface& surface, const std::array<float, 5>& r, bool back, const glm::vec3& lo,
-                float edge, uint32_t m) {
-    const float wanted = r[0] * surface.area.back();
-    const size_t piece = std::min(
-        size_t(std::upper_bound(surface.area.begin(), surface.area.end(), wanted) - surface.area.begin()),
-        surface.area.size() - 1);
-    const auto& [a, b, c] = surface.pieces[piece];
-    const float root = std::sqrt(r[1]), w1 = root * (1 - r[2]), w2 = root * r[2];
-    const glm::vec3 normal = back ? -surface.normals[piece] : surface.normals[piece];
-    const glm::vec3 origin = a + (b - a) * w1 + (c - a) * w2 + normal * scene_.offset;
-    const glm::vec3 direction = cosine_about(normal, r[3], r[4]);
-    // Where it leaves the cell.
-    float way = INFINITY;
-    uint32_t axis = 0;
-    for (int k = 0; k < 3; ++k) {
-      if (direction[k] == 0) continue;
-      const float side = direction[k] > 0 ? lo_[k] + size_ : lo_[k];
-      const float t = (side - origin[k]) / direction[k];
-      if (t < way) {
-        way = t;
-        axis = uint32_t(k);
-      }
+  // The rays of a batch up to `count`, to near_ and rays_ unless their entries are settled.
+  void add_near(const NearRays& batch, size_t count) {
+    for (size_t i = 0; i < count; ++i) {
+      const uint32_t entry = batch.entry[i];
+      if (entry == NearRays::kNone || met_[entry].settled()) continue;
+      NearRay& ray = near_.emplace_back();
+      ray.entry = entry;
+      for (size_t k = 0; k < kPlaces; ++k) ray.place[k] = batch.place[k][i];
+      const glm::vec3 origin(batch.origin[0][i], batch.origin[1][i], batch.origin[2][i]);
+      ray.origin = origin - centre_;
+      ray.way = {batch.way[0][i], batch.way[1][i], batch.way[2][i]};
+      rays_.push_back({f3(origin), 0.0f, f3(ray.way), 1.0f});
     }
-    if (!(way > 0) || !std::isfinite(way)) return;
-    const uint32_t face = 2 * axis + (direction[int(axis)] > 0 ? 1 : 0);
-    const Face f(face);
-    const glm::vec3 end = origin + direction * way;
-    const auto patch = [&](float x, float& place) {
-      const float q = std::clamp(x / size_ * float(m), 0.0f, float(m));
-      const uint32_t i = std::min(uint32_t(q), m - 1);
-      place = 2 * (q - float(i)) - 1;
-      return i;
-    };
-    NearRay ray{};
-    const uint32_t u = patch(end[f.u] - lo_[f.u], ray.place[3]);
-    const uint32_t v = patch(end[f.v] - lo_[f.v], ray.place[4]);
-    ray.entry = face * m * m + u + m * v;
-    if (met_[ray.entry].settled()) return;
-    for (int k = 0; k < 3; ++k) ray.place[size_t(k)] = (origin[k] - lo[k]) * (2 / edge) - 1.0f;
-    ray.origin = origin - centre_;
-    ray.way = direction * way;
-    near_.push_back(ray);
-    rays_.push_back({f3(origin), 0.0f, f3(ray.way), 1.0f});
   }
 
   const CellScene& scene_;
@@ -468,6 +434,7 @@ class Filler {
   CellLines::Hits first_, last_;  // of these
 
   // Of the sub-cell that is being filled.
+  NearRays batch_;
   std::vector<NearRay> near_;
   std::vector<Entry> met_;
   NearSamples sorted_;
