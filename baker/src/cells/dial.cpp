@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <span>
 
 #include "../surface_rays.h"
@@ -60,7 +61,8 @@ struct Rays {
   std::vector<LspRay> rays;  // kPerPoint of each point, one after the other
   std::vector<View> views;   // of them
   std::vector<LspHit> truth;
-  lsp_trace_counts counts{};  // of exact rays
+  lsp_trace_counts counts{};               // of exact rays
+  std::map<uint32_t, DialError> measured;  // by dial: what is known already
 };
 
 std::vector<LspHit> trace(const lsp_scene& scene, const lsp_trace_options& options,
@@ -121,11 +123,11 @@ class Dial {
   }
 
   // Of a quality as the header states it: the worst error of any set, and the gain over all rays.
-  QualityFigures figures(uint32_t quality) const {
+  QualityFigures figures(uint32_t quality) {
     QualityFigures out;
     lsp_trace_counts exact{}, cells{};
-    for (const Rays& set : sets_) {
-      const DialError error = measure(set, quality);
+    for (Rays& set : sets_) {
+      const DialError& error = measured(set, quality);
       out.wrong = std::max(out.wrong, error.wrong);
       out.depth = std::max(out.depth, error.depth);
       out.occlusion = std::max(out.occlusion, error.picture);
@@ -154,8 +156,8 @@ class Dial {
       header_.quality[LSP_QUALITY_BALANCED] = dial;
       double cost = 0;
       bool kept = true;
-      for (const Rays& set : sets_) {
-        const DialError error = measure(set, LSP_QUALITY_BALANCED);
+      for (Rays& set : sets_) {
+        const DialError& error = measured(set, LSP_QUALITY_BALANCED);
         cost += kVulkan.cells(error.counts);
         kept = kept && within(error, wrong);
         if (!kept) break;
@@ -221,6 +223,13 @@ class Dial {
       open.add(open_share(&set.truth[p * kPerPoint], radius * diagonal_),
                open_share(&hits[p * kPerPoint], radius * diagonal_));
     return open.off / std::max(0.25 * view.pixels, open.truth);
+  }
+
+  // The searches for two qualities, and their figures, ask for the same dials.
+  const DialError& measured(Rays& set, uint32_t quality) const {
+    const auto [known, added] = set.measured.try_emplace(header_.quality[quality]);
+    if (added) known->second = measure(set, quality);
+    return known->second;
   }
 
   DialError measure(const Rays& set, uint32_t quality) const {
