@@ -154,27 +154,33 @@ class Dial {
     for (size_t near = 0, far = heeded(kClasses, most >> 8u); near < nears && far > 0;) {
       const uint32_t dial = LSP_DIAL(kClasses[near], kClasses[far - 1]);
       header_.quality[LSP_QUALITY_BALANCED] = dial;
-      double cost = 0;
-      bool kept = true;
-      for (Rays& set : sets_) {
-        const DialError& error = measured(set, LSP_QUALITY_BALANCED);
-        cost += kVulkan.cells(error.counts);
-        kept = kept && within(error, wrong);
-        if (!kept) break;
+      if (!keeps(wrong)) {
+        --far;
+        continue;
       }
-      if (kept && cost < least) {
+      double cost = 0;
+      for (Rays& set : sets_) cost += kVulkan.cells(measured(set, LSP_QUALITY_BALANCED).counts);
+      if (cost < least) {
         least = cost;
         best = dial;
       }
-      if (kept)
-        ++near;
-      else
-        --far;
+      ++near;
     }
     return best;
   }
 
  private:
+  // Whether the header's `balanced` keeps within errors with all rays: those that did not the last time most
+  // likely do not now, and then spare the others.
+  bool keeps(double wrong) {
+    if (!within(measured(sets_[worst_], LSP_QUALITY_BALANCED), wrong)) return false;
+    for (size_t i = 0; i < sets_.size(); ++i)
+      if (!within(measured(sets_[i], LSP_QUALITY_BALANCED), wrong)) {
+        worst_ = i;
+        return false;
+      }
+    return true;
+  }
   // How many of these classes, which ascend, are no more than `most`.
   static size_t heeded(std::span<const uint32_t> classes, uint32_t most) {
     return size_t(std::upper_bound(classes.begin(), classes.end(), most) - classes.begin());
@@ -268,6 +274,7 @@ class Dial {
   std::vector<float> brightness_;   // by material; empty: light does not count
   std::vector<uint32_t> material_;  // by primitive
   std::array<Rays, 3> sets_;
+  size_t worst_ = 0;  // the set that last did not keep within errors
 };
 
 }  // namespace
