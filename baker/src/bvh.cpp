@@ -2,13 +2,18 @@
 
 #include <tbb/task_group.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
+#include <bit>
 #include <cmath>
+#include <functional>
+#include <iterator>
 #include <memory>
 
 #include "box.h"
 #include "lsp/program.h"
+#include "triangle_cut.h"
 
 namespace lsp {
 namespace {
@@ -36,7 +41,7 @@ struct ObjectSplit {
   double cost = INFINITY;
   int axis = 0;
   int bin = 0;  // references of bins below it go left
-  Box overlap;
+  Box4 overlap;
 };
 
 struct SpatialSplit {
@@ -88,7 +93,7 @@ class Builder {
 
   void build_node(TreeNode& node, std::vector<Reference> references, size_t spare, uint32_t depth,
                   uint32_t patience) {
-    for (const Reference& r : references) node.box.grow(r.box);
+    node.box = bounds_of(references).box();
     const size_t count = references.size();
     if (count <= 1) return make_leaf(node, references);
 
@@ -99,14 +104,17 @@ class Builder {
       SpatialSplit spatial;
       const bool overlapping = spare > 0 && patience > 0 && !object.overlap.empty() &&
                                object.overlap.half_area() > options_.split_overlap * root_area_;
-      if (overlapping) spatial = find_spatial_split(references, node.box);
-      const double area = node.box.half_area();
+      const double area = node.box.half_area(), traversal_cost = options_.traversal_cost * area;
       const double leaf_cost = options_.triangle_cost * double(count) * area;
+      const bool may_be_leaf = count <= options_.max_leaf_triangles;
+      // What costs more would not be chosen.
+      const double most = may_be_leaf ? std::min(object.cost, leaf_cost - traversal_cost) : object.cost;
+      if (overlapping) spatial = find_spatial_split(references, node.box, most);
       const bool use_spatial = spatial.cost < object.cost && spatial.left + spatial.right <= count + spare &&
                                spatial.left && spatial.right;
       if (overlapping) patience = use_spatial ? kPatience : patience - 1;
-      const double cost = options_.traversal_cost * area + (use_spatial ? spatial.cost : object.cost);
-      if (count <= options_.max_leaf_triangles && leaf_cost <= cost) return make_leaf(node, references);
+      const double cost = traversal_cost + (use_spatial ? spatial.cost : object.cost);
+      if (may_be_leaf && leaf_cost <= cost) return make_leaf(node, references);
       if (use_spatial) {
         split_spatially(references, spatial, left, right);
         // Both sides of a plane may end up with everything when slivers lie along it.
@@ -116,7 +124,7 @@ class Builder {
         left.clear();
         right.clear();
         split_objects(references, object, left, right);
-        split = !left.empty() && !right.empty();
+        split = true;
       }
     }
     if (!split) {
@@ -155,16 +163,22 @@ class Builder {
       progress_(std::min(1.0, double(before) / double(mesh_.triangles.size())));
   }
 
+  static Box4 bounds_of(const std::vector<Reference>& references) {
+    Box4 bounds;
+    for (const Reference& r : references) bounds.grow(Box4(r.box));
+    return bounds;
+  }
+
   // Calls f(b, box of the bins below b, box of the others) for every border between two bins.
   template <typename F>
-  static void sweep(const std::array<Box, kBins>& boxes, F&& f) {
-    std::array<Box, kBins> right;
-    Box box;
+  static void sweep(const std::array<Box4, kBins>& boxes, F&& f) {
+    std::array<Box4, kBins> right;
+    Box4 box;
     for (int b = kBins - 1; b > 0; --b) {
       box.grow(boxes[b]);
       right[b] = box;
     }
-    box = Box();
+    box = Box4();
     for (int b = 1; b < kBins; ++b) {
       box.grow(boxes[b - 1]);
       f(b, box, right[b]);
@@ -172,68 +186,99 @@ class Builder {
   }
 
   // Of the children; infinite where one would be empty.
-  double split_cost(size_t left, const Box& left_box, size_t right, const Box& right_box) const {
+  double split_cost(size_t left, const Box4& left_box, size_t right, const Box4& right_box) const {
     if (left == 0 || right == 0) return INFINITY;
     return options_.triangle_cost *
            (double(left) * left_box.half_area() + double(right) * right_box.half_area());
   }
 
-  ObjectSplit find_object_split(const std::vector<Reference>& references) const {
-    Box centroids;
-    for (const Reference& r : references) centroids.grow(r.box.centre());
-    ObjectSplit best;
-    for (int axis = 0; axis < 3; ++axis) {
-      const Binning bin(centroids.lo[axis], centroids.hi[axis]);
-      if (bin.scale == 0) continue;
-      std::array<Box, kBins> boxes;
-      std::array<size_t, kBins> counts{};
-      for (const Reference& r : references) {
-        const int b = bin(r.box.centre()[axis]);
-        boxes[b].grow(r.box);
-        ++counts[b];
-      }
-      size_t left = 0;
-      sweep(boxes, [&](int b, const Box& left_box, const Box& right_box) {
-        left += counts[b - 1];
-        const double cost = split_cost(left, left_box, references.size() - left, right_box);
-        if (cost < best.cost) best = {cost, axis, b, intersection(left_box, right_box)};
-      });
+  // References by the bin of their centre along an axis.
+  struct ObjectBins {
+    uint32_t used = 0;  // bits of the bins that hold any
+    std::array<Box4, kBins> boxes;
+    std::array<uint32_t, kBins> counts{};
+
+    void add(int b, const Box4& box) {
+      boxes[b].grow(box);
+      ++counts[b];
+      used |= 1u << b;
     }
+  };
+
+  ObjectSplit find_object_split(const std::vector<Reference>& references) const {
+    Box4 centroids;
+    for (const Reference& r : references) centroids.grow(Box4(r.box).centre());
+    const Binning bin[] = {{centroids.lo[0], centroids.hi[0]},
+                           {centroids.lo[1], centroids.hi[1]},
+                           {centroids.lo[2], centroids.hi[2]}};
+    std::array<ObjectBins, 3> bins;
+    for (const Reference& r : references) {
+      const Box4 box(r.box);
+      const Float4 centre = box.centre();
+      for (int axis = 0; axis < 3; ++axis) bins[axis].add(bin[axis](centre[axis]), box);
+    }
+    ObjectSplit best;
+    for (int axis = 0; axis < 3; ++axis)
+      if (bin[axis].scale != 0) try_borders(bins[axis], axis, references.size(), best);
     return best;
   }
 
-  void split_objects(const std::vector<Reference>& references, const ObjectSplit& split,
-                     std::vector<Reference>& left, std::vector<Reference>& right) const {
+  // Borders with an empty bin below them divide the references as the one before does.
+  void try_borders(const ObjectBins& bins, int axis, size_t count, ObjectSplit& best) const {
+    std::array<Box4, kBins> right;  // of a bin that is used and those above it
+    Box4 box;
+    for (uint32_t rest = bins.used; rest != 0;) {
+      const int b = std::bit_width(rest) - 1;
+      rest &= ~(1u << b);
+      box.grow(bins.boxes[b]);
+      right[b] = box;
+    }
+    box = Box4();
+    size_t left = 0;
+    for (uint32_t rest = bins.used; (rest & (rest - 1)) != 0;) {
+      const int b = std::countr_zero(rest);
+      rest &= rest - 1;
+      const Box4& others = right[std::countr_zero(rest)];
+      box.grow(bins.boxes[b]);
+      left += bins.counts[b];
+      const double cost = split_cost(left, box, count - left, others);
+      if (cost < best.cost) best = {cost, axis, b + 1, intersection(box, others)};
+    }
+  }
+
+  // Leaves those on the left where they are.
+  static void split_objects(std::vector<Reference>& references, const ObjectSplit& split,
+                            std::vector<Reference>& left, std::vector<Reference>& right) {
     Box centroids;
     for (const Reference& r : references) centroids.grow(r.box.centre());
     const Binning bin(centroids.lo[split.axis], centroids.hi[split.axis]);
-    for (const Reference& r : references)
-      (bin(r.box.centre()[split.axis]) < split.bin ? left : right).push_back(r);
+    const auto goes_left = [&](const Reference& r) { return bin(r.box.centre()[split.axis]) < split.bin; };
+    right.reserve(size_t(std::count_if(references.begin(), references.end(), std::not_fn(goes_left))));
+    std::copy_if(references.begin(), references.end(), std::back_inserter(right), std::not_fn(goes_left));
+    references.resize(size_t(std::remove_if(references.begin(), references.end(), std::not_fn(goes_left)) -
+                             references.begin()));
+    left = std::move(references);
   }
 
-  // The parts of a reference's box on both sides of a plane that cuts it: bounds of the triangle's corners
-  // and of its edges' intersections with the plane, inside the reference's own box.
+  TriangleCut cut_of(uint32_t triangle, int axis) const {
+    return {{&corner(triangle, 0), &corner(triangle, 1), &corner(triangle, 2)}, axis};
+  }
+
+  // The parts of a box on both sides of a plane that cuts a triangle in it.
+  static void cut(const TriangleCut& triangle, const Box4& box, int axis, float plane, Box4& left,
+                  Box4& right) {
+    triangle.at(plane, left, right);
+    left = intersection(left, box);
+    right = intersection(right, box);
+    const Float4 planes = Float4{} + plane;
+    left.hi = Int4{0, 1, 2, 3} == axis ? lesser(left.hi, planes) : left.hi;
+    right.lo = Int4{0, 1, 2, 3} == axis ? greater(right.lo, planes) : right.lo;
+  }
   void cut(const Reference& r, int axis, float plane, Box& left, Box& right) const {
-    left = Box();
-    right = Box();
-    for (int c = 0; c < 3; ++c) {
-      const glm::vec3 a = corner(r.triangle, c), b = corner(r.triangle, (c + 1) % 3);
-      if (a[axis] <= plane) left.grow(a);
-      if (a[axis] >= plane) right.grow(a);
-      if ((a[axis] < plane && b[axis] > plane) || (a[axis] > plane && b[axis] < plane)) {
-        // In double and from the lower end, so that neighbours sharing the edge get the same point.
-        const bool up = a[axis] < b[axis];
-        const glm::dvec3 p = up ? a : b, q = up ? b : a;
-        glm::vec3 x(p + (q - p) * ((double(plane) - p[axis]) / (q[axis] - p[axis])));
-        x[axis] = plane;
-        left.grow(x);
-        right.grow(x);
-      }
-    }
-    left = intersection(left, r.box);
-    right = intersection(right, r.box);
-    left.hi[axis] = std::min(left.hi[axis], plane);
-    right.lo[axis] = std::max(right.lo[axis], plane);
+    Box4 below, above;
+    cut(cut_of(r.triangle, axis), Box4(r.box), axis, plane, below, above);
+    left = below.box();
+    right = above.box();
   }
 
   // Leaves of a reference's box what is inside another one; all of it where rounding leaves nothing.
@@ -257,46 +302,97 @@ class Builder {
     return bounds.hi[axis] - bounds.lo[axis] > float(kBins) * 4 * 0x1p-23f * reach;
   }
 
-  SpatialSplit find_spatial_split(const std::vector<Reference>& references, const Box& bounds) const {
+  // The borders between bins along an axis of a node, and how many references begin and end in a bin.
+  struct SpatialBins {
+    Binning bin;
+    std::array<float, kBins - 1> planes;  // above a bin
+    std::array<uint32_t, kBins> entries{}, exits{};
+
+    SpatialBins(const Box& bounds, int axis) : bin(bounds.lo[axis], bounds.hi[axis]) {
+      for (int b = 0; b + 1 < kBins; ++b) planes[b] = bin.plane(b + 1);
+    }
+  };
+
+  // No split along the axis costs less than this, but for rounding: a part of a triangle holds the corners on
+  // its side, and reaches to the plane.
+  double least_cost(const std::vector<Reference>& references, int axis, SpatialBins& bins) const {
+    std::array<Box4, kBins> corners;
+    for (const Reference& r : references) {
+      const int first = bins.bin(r.box.lo[axis]), last = bins.bin(r.box.hi[axis]);
+      ++bins.entries[first];
+      ++bins.exits[last];
+      const Box4 box(r.box);
+      for (int c = 0; c < 3; ++c) {
+        const glm::vec3& x = corner(r.triangle, c);
+        const Float4 at = float4(x);
+        if (box.holds(at)) corners[std::clamp(bins.bin(x[axis]), first, last)].grow(at);
+      }
+    }
+    double least = INFINITY;
+    size_t left = 0, exited = 0;
+    sweep(corners, [&](int b, Box4 left_box, Box4 right_box) {
+      left += bins.entries[b - 1];
+      exited += bins.exits[b - 1];
+      if (left > exited) {
+        const float plane = bins.planes[b - 1];
+        left_box.hi = Int4{0, 1, 2, 3} == axis ? greater(left_box.hi, Float4{} + plane) : left_box.hi;
+        right_box.lo = Int4{0, 1, 2, 3} == axis ? lesser(right_box.lo, Float4{} + plane) : right_box.lo;
+      }
+      least = std::min(least, split_cost(left, left_box, references.size() - exited, right_box));
+    });
+    return least;
+  }
+
+  // The best split that costs less than `limit`; where there is none, one that costs as much or infinitely
+  // much.
+  SpatialSplit find_spatial_split(const std::vector<Reference>& references, const Box& bounds,
+                                  double limit) const {
     SpatialSplit best;
     for (int axis = 0; axis < 3; ++axis) {
-      const Binning bin(bounds.lo[axis], bounds.hi[axis]);
-      if (bin.scale == 0 || !separates(bounds, axis)) continue;
-      std::array<Box, kBins> boxes;
-      std::array<size_t, kBins> entries{}, exits{};
-      for (const Reference& r : references) {
-        const int first = bin(r.box.lo[axis]), last = bin(r.box.hi[axis]);
-        Reference rest = r;
-        for (int b = first; b < last; ++b) {
-          Box left, right;
-          cut(rest, axis, bin.plane(b + 1), left, right);
-          if (!left.empty()) boxes[b].grow(left);
-          if (right.empty()) {
-            rest.box = Box();
-            break;
-          }
-          rest.box = right;
-        }
-        if (!rest.box.empty()) boxes[last].grow(rest.box);
-        ++entries[first];
-        ++exits[last];
-      }
-      size_t left = 0, exited = 0;
-      sweep(boxes, [&](int b, const Box& left_box, const Box& right_box) {
-        left += entries[b - 1];
-        exited += exits[b - 1];
-        const size_t right = references.size() - exited;
-        const double cost = split_cost(left, left_box, right, right_box);
-        if (cost < best.cost) best = {cost, axis, bin.plane(b), left, right};
-      });
+      SpatialBins bins(bounds, axis);
+      if (bins.bin.scale == 0 || !separates(bounds, axis)) continue;
+      constexpr double kRounding = 1e-4;
+      if ((1 - kRounding) * least_cost(references, axis, bins) > std::min(limit, best.cost)) continue;
+      try_planes(references, axis, bins, best);
     }
     return best;
+  }
+
+  void try_planes(const std::vector<Reference>& references, int axis, const SpatialBins& bins,
+                  SpatialSplit& best) const {
+    std::array<Box4, kBins> boxes;
+    for (const Reference& r : references) {
+      const int first = bins.bin(r.box.lo[axis]), last = bins.bin(r.box.hi[axis]);
+      if (first == last) {
+        boxes[first].grow(Box4(r.box));
+        continue;
+      }
+      const TriangleCut triangle = cut_of(r.triangle, axis);
+      Box4 rest(r.box);
+      for (int b = first; b < last && !rest.empty(); ++b) {
+        Box4 left, right;
+        cut(triangle, rest, axis, bins.planes[b], left, right);
+        if (!left.empty()) boxes[b].grow(left);
+        rest = right;
+      }
+      if (!rest.empty()) boxes[last].grow(rest);
+    }
+    size_t left = 0, exited = 0;
+    sweep(boxes, [&](int b, const Box4& left_box, const Box4& right_box) {
+      left += bins.entries[b - 1];
+      exited += bins.exits[b - 1];
+      const size_t right = references.size() - exited;
+      const double cost = split_cost(left, left_box, right, right_box);
+      if (cost < best.cost) best = {cost, axis, bins.planes[b - 1], left, right};
+    });
   }
 
   void split_spatially(const std::vector<Reference>& references, const SpatialSplit& split,
                        std::vector<Reference>& left, std::vector<Reference>& right) const {
     // First the references on one side only; then each that straddles goes where it costs least (Stich 4.4).
     Box left_box, right_box;
+    left.reserve(split.left);
+    right.reserve(split.right);
     std::vector<Reference> straddling;
     for (const Reference& r : references) {
       if (r.box.hi[split.axis] <= split.plane) {

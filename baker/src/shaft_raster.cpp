@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <optional>
 
 #include "clones.h"
 
@@ -101,13 +100,14 @@ struct Seen {
 
 // The rays' hits so far, by patch: an array each.
 struct Lists {
-  float *t_first, *t_last;
-  uint32_t *first, *last;
+  float* t;
+  uint32_t* records;
 };
 
 LSP_CLONES void test(const Seen& s, size_t begin, size_t end, const float* x, const float* y, const float* z,
                      const Lists& lists) {
-  const auto [t_first, t_last, first, last] = lists;
+  float* const t = lists.t;
+  uint32_t* const records = lists.records;
   for (size_t i = begin; i < end; ++i) {
     const float e0 = x[i] * s.edge[0][0] + y[i] * s.edge[0][1] + z[i] * s.edge[0][2];
     const float e1 = x[i] * s.edge[1][0] + y[i] * s.edge[1][1] + z[i] * s.edge[1][2];
@@ -119,117 +119,34 @@ LSP_CLONES void test(const Seen& s, size_t begin, size_t end, const float* x, co
     const bool inside = (lowest >= 0.0f) | (highest <= 0.0f);
     const bool facing = lowest != highest;
     const bool hit = inside & facing & (depth > kNearest) & (depth < ShaftRaster::kMiss);
-    const bool nearer = hit & ((depth < t_first[i]) | ((depth == t_first[i]) & (s.record < first[i])));
-    const bool farther = hit & ((depth > t_last[i]) | ((depth == t_last[i]) & (s.record < last[i])));
-    t_first[i] = nearer ? depth : t_first[i];
-    first[i] = nearer ? s.record : first[i];
-    t_last[i] = farther ? depth : t_last[i];
-    last[i] = farther ? s.record : last[i];
-  }
-}
-
-using Rectangle = std::array<glm::vec3, 4>;
-
-// Of two opposite corners, flat along one axis; its corners in turn.
-Rectangle rectangle(const glm::vec3& lo, const glm::vec3& hi) {
-  const int axis = lo.x == hi.x ? 0 : lo.y == hi.y ? 1 : 2, u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;
-  Rectangle r = {lo, lo, hi, hi};
-  r[1][u] = hi[u];
-  r[3] = lo;
-  r[3][v] = hi[v];
-  return r;
-}
-
-struct HalfSpace {
-  glm::vec3 normal;  // outwards, unit length
-  float distance;
-};
-
-// The half-space whose border is the plane through an edge of one of two rectangles and a corner of the
-// other, if it holds both.
-std::optional<HalfSpace> supporting(const glm::vec3& a, const glm::vec3& b, const glm::vec3& c,
-                                    const Rectangle& from, const Rectangle& to) {
-  const glm::vec3 across = glm::cross(b - a, c - a);
-  const float area = glm::length(across), edge = glm::length(b - a);
-  if (!(area > 1e-4f * edge * edge)) return {};
-  HalfSpace h{across / area, 0};
-  float least = 0, most = 0;
-  for (const Rectangle* r : {&from, &to})
-    for (const glm::vec3& p : *r) {
-      const float d = glm::dot(h.normal, p - a);
-      least = std::min(least, d);
-      most = std::max(most, d);
-    }
-  const float tolerance = 1e-4f * edge;
-  if (least < -tolerance && most > tolerance) return {};
-  if (most > tolerance) h.normal = -h.normal;
-  h.distance = glm::dot(h.normal, a) + tolerance;
-  return h;
-}
-
-LSP_CLONES void mark_outside(const HalfSpace& h, float margin, size_t count, const float* const* c,
-                             uint8_t* outside) {
-  const float x = h.normal.x, y = h.normal.y, z = h.normal.z, limit = h.distance + margin;
-  const float *x0 = c[0], *y0 = c[1], *z0 = c[2], *x1 = c[3], *y1 = c[4], *z1 = c[5], *x2 = c[6], *y2 = c[7],
-              *z2 = c[8];
-  for (size_t k = 0; k < count; ++k) {
-    const float d0 = x * x0[k] + y * y0[k] + z * z0[k], d1 = x * x1[k] + y * y1[k] + z * z1[k],
-                d2 = x * x2[k] + y * y2[k] + z * z2[k];
-    const bool out = (d0 > limit) & (d1 > limit) & (d2 > limit);
-    outside[k] = uint8_t(outside[k] | out);
+    const bool nearer = hit & ((depth < t[i]) | ((depth == t[i]) & (s.record < records[i])));
+    t[i] = nearer ? depth : t[i];
+    records[i] = nearer ? s.record : records[i];
   }
 }
 
 }  // namespace
 
 ShaftRaster::ShaftRaster(const glm::vec3& lo, const glm::vec3& hi, uint32_t resolution)
-    : lo_(lo), hi_(hi), n_(resolution), last_t_(size_t(n_) * n_), last_records_(size_t(n_) * n_) {
+    : lo_(lo), hi_(hi), n_(resolution) {
   for (auto& axis : directions_) axis.resize(size_t(n_) * n_);
 }
 
 void ShaftRaster::add(const LspTriangle& triangle, uint32_t record) {
   const lsp_float3* corners[] = {&triangle.v0, &triangle.v1, &triangle.v2};
   for (int i = 0; i < 3; ++i) {
-    all_.corners[3 * i].push_back(corners[i]->x);
-    all_.corners[3 * i + 1].push_back(corners[i]->y);
-    all_.corners[3 * i + 2].push_back(corners[i]->z);
+    corners_[3 * i].push_back(corners[i]->x);
+    corners_[3 * i + 1].push_back(corners[i]->y);
+    corners_[3 * i + 2].push_back(corners[i]->z);
   }
-  all_.records.push_back(record);
-}
-
-void ShaftRaster::narrow(const glm::vec3& from_lo, const glm::vec3& from_hi, uint32_t face, float margin) {
-  const int axis = int(face / 2);
-  glm::vec3 to_lo = lo_, to_hi = hi_;
-  to_lo[axis] = to_hi[axis] = face % 2 ? hi_[axis] : lo_[axis];
-  const auto from = rectangle(from_lo, from_hi), to = rectangle(to_lo, to_hi);
-  const size_t count = size();
-  outside_.assign(count, 0);
-  const float* corners[9];
-  for (int i = 0; i < 9; ++i) corners[i] = all_.corners[i].data();
-  for (const auto* side : {&from, &to})
-    for (size_t i = 0; i < 4; ++i)
-      for (const glm::vec3& p : side == &from ? to : from)
-        if (const auto plane = supporting((*side)[i], (*side)[(i + 1) % 4], p, from, to))
-          mark_outside(*plane, margin, count, corners, outside_.data());
-  narrow_ = true;
-  for (auto& c : narrowed_.corners) c.clear();
-  narrowed_.records.clear();
-  for (size_t k = 0; k < count; ++k) {
-    if (outside_[k]) continue;
-    for (int i = 0; i < 9; ++i) narrowed_.corners[i].push_back(all_.corners[i][k]);
-    narrowed_.records.push_back(all_.records[k]);
-  }
+  records_.push_back(record);
 }
 
 void ShaftRaster::cast(const glm::vec3& origin, uint32_t face, float x, float y,
-                       std::span<const glm::vec3> ends, const RasterHits& first, RasterHits last) {
-  if (last.t.empty()) last = {last_t_, last_records_};
-  std::fill(first.t.begin(), first.t.end(), kMiss);
-  std::fill(last.t.begin(), last.t.end(), 0.0f);
-  for (std::span<uint32_t> records : {first.records, last.records})
-    std::fill(records.begin(), records.end(), LSP_NONE);
-  const Triangles& triangles = narrow_ ? narrowed_ : all_;
-  const size_t count = triangles.records.size();
+                       std::span<const glm::vec3> ends, const RasterHits& hits) {
+  std::fill(hits.t.begin(), hits.t.end(), kMiss);
+  std::fill(hits.records.begin(), hits.records.end(), LSP_NONE);
+  const size_t count = size();
   const int axis = int(face / 2), u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;
   const float end = face % 2 ? hi_[axis] : lo_[axis];
   Projection p;
@@ -244,11 +161,11 @@ void ShaftRaster::cast(const glm::vec3& origin, uint32_t face, float x, float y,
   p.offset_u = (origin[u] - lo_[u]) * p.scale_u - x;
   p.offset_v = (origin[v] - lo_[v]) * p.scale_v - y;
   const float* corners[9];
-  for (int i = 0; i < 9; ++i) corners[i] = triangles.corners[i / 3 * 3 + order[i % 3]].data();
+  for (int i = 0; i < 9; ++i) corners[i] = corners_[i / 3 * 3 + order[i % 3]].data();
   covered_.resize(count);
   project(p, count, corners, covered_.data());
 
-  const Lists lists = {first.t.data(), last.t.data(), first.records.data(), last.records.data()};
+  const Lists lists = {hits.t.data(), hits.records.data()};
   for (size_t i = 0; i < ends.size(); ++i)
     for (int j = 0; j < 3; ++j) directions_[j][i] = ends[i][j] - origin[j];
   for (size_t k = 0; k < count; ++k) {
@@ -256,8 +173,7 @@ void ShaftRaster::cast(const glm::vec3& origin, uint32_t face, float x, float y,
     if (cells == 0) continue;
     glm::vec3 corner[3], from_origin[3];
     for (int i = 0; i < 3; ++i) {
-      corner[i] = {triangles.corners[3 * i][k], triangles.corners[3 * i + 1][k],
-                   triangles.corners[3 * i + 2][k]};
+      corner[i] = {corners_[3 * i][k], corners_[3 * i + 1][k], corners_[3 * i + 2][k]};
       from_origin[i] = corner[i] - origin;
     }
     const auto &a = from_origin[0], &b = from_origin[1], &c = from_origin[2];
@@ -272,7 +188,7 @@ void ShaftRaster::cast(const glm::vec3& origin, uint32_t face, float x, float y,
     const float w[] = {p.sign * a[axis], p.sign * b[axis], p.sign * c[axis]};
     seen.t_lo = std::min({w[0], w[1], w[2]}) / p.plane;
     seen.t_hi = std::max({w[0], w[1], w[2]}) / p.plane;
-    seen.record = triangles.records[k];
+    seen.record = records_[k];
     const uint32_t column0 = cells & 0xFF, column1 = cells >> 8 & 0xFF, row0 = cells >> 16 & 0xFF,
                    row1 = cells >> 24;
     const bool wide = column1 - column0 == n_;  // then the rows are one run of patches

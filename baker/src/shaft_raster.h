@@ -35,35 +35,21 @@ class ShaftRaster {
 
   // `record` is what answers name the triangle by.
   void add(const LspTriangle& triangle, uint32_t record);
-  size_t size() const { return all_.records.size(); }
-
-  // Leaves out, until it is called again, what no ray from the rectangle with these corners, a part of
-  // another side, to `face` can hit: what is farther than `margin` from all of them.
-  void narrow(const glm::vec3& from_lo, const glm::vec3& from_hi, uint32_t face, float margin);
+  size_t size() const { return records_.size(); }
 
   // Casts the rays from `origin`, a point of another side, to `ends`, the points (x, y) in [0, 1)^2 of the
-  // patches of `face`. Spans have resolution^2 elements, by patch. `first` is what a ray meets first, kMiss
-  // and LSP_NONE where it meets nothing; `last`, unless its spans are empty, what it meets last, 0 and
-  // LSP_NONE: the first of the same ray the other way round.
+  // patches of `face`. Spans have resolution^2 elements, by patch; kMiss and LSP_NONE where a ray meets
+  // nothing.
   void cast(const glm::vec3& origin, uint32_t face, float x, float y, std::span<const glm::vec3> ends,
-            const RasterHits& first, RasterHits last = {});
+            const RasterHits& hits);
 
  private:
-  // A triangle an element.
-  struct Triangles {
-    std::vector<float> corners[9];  // v0.x, v0.y, v0.z, v1.x, ...
-    std::vector<uint32_t> records;
-  };
-
   glm::vec3 lo_, hi_;
   uint32_t n_;
-  Triangles all_, narrowed_;
-  bool narrow_ = false;
-  std::vector<uint8_t> outside_;      // by triangle
+  std::vector<float> corners_[9];     // by triangle: v0.x, v0.y, v0.z, v1.x, ...
+  std::vector<uint32_t> records_;     // by triangle
   std::vector<uint32_t> covered_;     // by triangle: the patches that its projection may cover
   std::vector<float> directions_[3];  // by patch
-  std::vector<float> last_t_;         // for those who do not ask for it
-  std::vector<uint32_t> last_records_;
 };
 
 }  // namespace lsp

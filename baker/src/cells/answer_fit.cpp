@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include "../clones.h"
@@ -17,32 +18,41 @@ constexpr float kWorthKeeping = 0.8f;  // and the fitted one this much
 constexpr float kDepthScale = 4.0f;    // in edges of a cell: a quarter of an edge off counts whole
 constexpr size_t kHeldOut = 4;         // every fourth sample
 constexpr int kTerms = kPlaces + 1;
-constexpr int kRow = 8;  // kTerms and a right-hand side, padded: a row is one vector
+constexpr size_t kLanes = 8;
 
-using Matrix = std::array<std::array<double, kRow>, kTerms>;
+using Form = std::array<double, kTerms>;
 
-// Gauss-Jordan with partial pivoting; false where the matrix is singular.
-bool solve(Matrix& m, std::array<double, kTerms>& x) {
+// Symmetric, of which the lower triangle counts, and a right-hand side.
+struct Equations {
+  std::array<std::array<double, kTerms>, kTerms> m{};
+  Form right{};
+};
+
+// By L D L^T; the matrix is positive definite.
+Form solve(Equations& e) {
+  auto& m = e.m;
+  Form& x = e.right;
   for (size_t i = 0; i < kTerms; ++i) {
-    size_t pivot = i;
-    for (size_t k = i + 1; k < kTerms; ++k)
-      if (std::fabs(m[k][i]) > std::fabs(m[pivot][i])) pivot = k;
-    if (std::fabs(m[pivot][i]) < 1e-12) return false;
-    std::swap(m[i], m[pivot]);
-    for (size_t k = i + 1; k < kTerms; ++k) {
-      const double f = m[k][i] / m[i][i];
-      for (size_t q = i; q <= kTerms; ++q) m[k][q] -= f * m[i][q];
+    std::array<double, kTerms> scaled;
+    for (size_t k = 0; k < i; ++k) {
+      scaled[k] = m[i][k];
+      for (size_t q = 0; q < k; ++q) scaled[k] -= scaled[q] * m[k][q];
     }
+    for (size_t k = 0; k < i; ++k) {
+      m[i][k] = scaled[k] * m[k][k];  // of the diagonal: 1 / D
+      m[i][i] -= scaled[k] * m[i][k];
+      x[i] -= m[i][k] * x[k];
+    }
+    m[i][i] = 1 / m[i][i];
   }
   for (size_t i = kTerms; i-- > 0;) {
-    double sum = m[i][kTerms];
-    for (size_t k = i + 1; k < kTerms; ++k) sum -= m[i][k] * x[k];
-    x[i] = sum / m[i][i];
+    x[i] *= m[i][i];
+    for (size_t k = i + 1; k < kTerms; ++k) x[i] -= m[k][i] * x[k];
   }
-  return true;
+  return x;
 }
 
-std::array<int8_t, kTerms> quantise(const std::array<double, kTerms>& weights) {
+std::array<int8_t, kTerms> quantise(const Form& weights) {
   double largest = 0;
   for (double w : weights) largest = std::max(largest, std::fabs(w));
   std::array<int8_t, kTerms> out{};
@@ -51,9 +61,18 @@ std::array<int8_t, kTerms> quantise(const std::array<double, kTerms>& weights) {
   return out;
 }
 
+// Not std::min, see ShaftRaster.
+constexpr float lesser(float a, float b) { return b < a ? b : a; }
+
+LSP_CLONES void lengths_of(const ShaftSamples& s, float* lengths) {
+  const float *x = s.way[0], *y = s.way[1], *z = s.way[2];
+  const size_t count = s.count;
+  for (size_t i = 0; i < count; ++i) lengths[i] = std::sqrt(x[i] * x[i] + y[i] * y[i] + z[i] * z[i]);
+}
+
 // What each sample loses where the answer is `plane`.
-LSP_CLONES void plane_losses(const ShaftSamples& s, const Plane& plane, float t_least, float depth_weight,
-                             float per_size, float* losses) {
+LSP_CLONES void plane_losses(const ShaftSamples& s, const float* lengths, const Plane& plane, float t_least,
+                             float depth_weight, float per_size, float* losses) {
   const glm::vec3 n = plane.normal;
   const float distance = plane.distance, depth_scale = kDepthScale * per_size;
   const float *ox = s.origin[0], *oy = s.origin[1], *oz = s.origin[2];
@@ -68,56 +87,109 @@ LSP_CLONES void plane_losses(const ShaftSamples& s, const Plane& plane, float t_
     const bool says = (t > t_least) & (t <= 1.0f + LSP_CELL_SLACK);
     const bool hits = met[i] != kNoPlane;
     const float low = t < 0.0f ? 0.0f : t, clamped = low > 1.0f ? 1.0f : low;
-    const float length = std::sqrt(wx[i] * wx[i] + wy[i] * wy[i] + wz[i] * wz[i]);
-    const float off = std::fabs(clamped - truth[i]) * length * depth_scale;
+    const float off = std::fabs(clamped - truth[i]) * lengths[i] * depth_scale;
     const float depth = depth_weight * (off < 1.0f ? off : 1.0f);
     const float loss = says ? depth : 0.0f;
     losses[i] = says != hits ? 1.0f : loss;
   }
 }
 
-// The linear form of a split at each place.
-LSP_CLONES void split_sides(const ShaftSamples& s, const std::array<float, kTerms>& weights, float* sides) {
-  const size_t count = s.count;
-  for (size_t i = 0; i < count; ++i) sides[i] = weights[kPlaces];
-  for (size_t k = 0; k < kPlaces; ++k) {
-    const float* place = s.place[k];
-    if (!place) continue;
-    const float weight = weights[k];
-    for (size_t i = 0; i < count; ++i) sides[i] += weight * place[i];
-  }
+// Adds to a candidate's losses what the kind of thing that each sample meets costs.
+LSP_CLONES void add_unlike(const float* by_kind, const uint32_t* kinds, size_t count, float* losses) {
+  for (size_t i = 0; i < count; ++i) losses[i] = lesser(1.0f, losses[i] + by_kind[kinds[i]]);
 }
 
-// Adds weight * terms^T (terms, sign) to the normal equations.
-inline void add_equation(Matrix& m, const std::array<double, kRow>& terms, double weight) {
-  for (size_t a = 0; a < kTerms; ++a) {
-    const double scale = weight * terms[a];
-    for (size_t b = 0; b < kRow; ++b) m[a][b] += scale * terms[b];
-  }
+// What each sample loses where the better of two answers is given.
+LSP_CLONES void lesser_losses(const float* first, const float* second, size_t count, float* losses) {
+  for (size_t i = 0; i < count; ++i) losses[i] = lesser(first[i], second[i]);
 }
 
-// The normal equations of which of two answers is the better one, weighted by how much; after the first pass
-// what lies beyond the margin, by the forms `w` so far, is weighted less.
-LSP_CLONES void normal_equations(const ShaftSamples& s, const float* first, const float* second,
-                                 size_t held_out, const std::array<double, kTerms>& w, bool again,
-                                 Matrix& m) {
+// What each sample loses where a linear form of its place chooses between two answers.
+LSP_CLONES void split_losses(const ShaftSamples& s, const std::array<float, kTerms>& w, const float* first,
+                             const float* second, float* losses) {
+  static_assert(kPlaces == 5);
+  const float *p0 = s.place[0], *p1 = s.place[1], *p2 = s.place[2], *p3 = s.place[3];
+  const float *p4 = s.place[4] ? s.place[4] : p0, w4 = s.place[4] ? w[4] : 0.0f;
   const size_t count = s.count;
   for (size_t i = 0; i < count; ++i) {
+    const float side = w[5] + w[0] * p0[i] + w[1] * p1[i] + w[2] * p2[i] + w[3] * p3[i] + w4 * p4[i];
+    losses[i] = side > 0 ? first[i] : second[i];
+  }
+}
+
+// What chooses of the samples, by which of two answers is the better one and how much. Behind the last one
+// nothing counts.
+LSP_CLONES void find_gains(const float* first, const float* second, size_t count, bool held_out,
+                           SplitSamples& s) {
+  const uint32_t held = held_out ? kHeldOut - 1 : kHeldOut;
+  double *gains = s.gain.data(), *signs = s.sign.data();
+  for (size_t i = 0; i < count; ++i) {
     const float gain = second[i] - first[i];  // positive: the first answer is the better one
-    if (i % kHeldOut == held_out || std::fabs(gain) < 1e-3f) continue;
-    const double sign = gain > 0 ? 1 : -1;
-    std::array<double, kRow> terms{};
-    double value = w[kPlaces];
-    for (size_t k = 0; k < kPlaces; ++k) {
-      terms[k] = s.place[k] ? s.place[k][i] : 0.0;
-      value += w[k] * terms[k];
+    const float size = std::fabs(gain);
+    const bool counts = (uint32_t(i) % kHeldOut != held) & (size >= 1e-3f);
+    gains[i] = double(counts ? size : 0.0f);
+    signs[i] = gain > 0 ? 1.0 : -1.0;
+  }
+}
+
+LSP_CLONES void widen(const float* from, size_t count, double* to) {
+  for (size_t i = 0; i < count; ++i) to[i] = double(from[i]);
+}
+
+// What lies beyond the margin, by the forms `w` so far, is weighted less.
+LSP_CLONES void weigh(const Form& w, SplitSamples& s) {
+  static_assert(kPlaces == 5);
+  const double *t0 = s.terms[0].data(), *t1 = s.terms[1].data(), *t2 = s.terms[2].data(),
+               *t3 = s.terms[3].data(), *t4 = s.terms[4].data(), *gains = s.gain.data(),
+               *signs = s.sign.data();
+  double* weights = s.weight.data();
+  const double w0 = w[0], w1 = w[1], w2 = w[2], w3 = w[3], w4 = w[4], w5 = w[5];
+  const size_t count = s.weight.size();
+  for (size_t i = 0; i < count; ++i) {
+    const double value = w5 + w0 * t0[i] + w1 * t1[i] + w2 * t2[i] + w3 * t3[i] + w4 * t4[i];
+    const double margin = signs[i] * value, beyond = margin > 0.0 ? margin : 0.0;
+    const double less = 1 / (1 + 3 * beyond);
+    weights[i] = gains[i] * (margin < 1.0 ? less : 0.1);
+  }
+}
+
+struct alignas(kLanes * sizeof(double)) Lane {
+  double v[kLanes];
+};
+[[gnu::always_inline]] inline Lane lane_at(const std::vector<double>& numbers, size_t first) {
+  Lane lane;
+  std::memcpy(lane.v, &numbers[first], sizeof lane.v);
+  return lane;
+}
+
+// The normal equations. Sums are of kLanes lanes whatever the machine's vectors hold, so that they are the
+// same everywhere.
+LSP_CLONES void normal_equations(const SplitSamples& s, const std::vector<double>& weights, Equations& e) {
+  Lane sums[kTerms][kTerms] = {}, right[kTerms] = {};
+  const size_t count = s.weight.size();
+  for (size_t first = 0; first < count; first += kLanes) {
+    // Copies, of which the compiler knows that they are apart.
+    Lane terms[kTerms], weight, sign;
+    for (size_t k = 0; k < kTerms; ++k) terms[k] = lane_at(s.terms[k], first);
+    weight = lane_at(weights, first);
+    sign = lane_at(s.sign, first);
+    for (size_t a = 0; a < kTerms; ++a) {
+      Lane scaled;
+      for (size_t i = 0; i < kLanes; ++i) scaled.v[i] = weight.v[i] * terms[a].v[i];
+      for (size_t b = 0; b <= a; ++b)
+        for (size_t i = 0; i < kLanes; ++i) sums[a][b].v[i] += scaled.v[i] * terms[b].v[i];
+      for (size_t i = 0; i < kLanes; ++i) right[a].v[i] += scaled.v[i] * sign.v[i];
     }
-    terms[kPlaces] = 1;
-    terms[kTerms] = sign;
-    const double margin = sign * value;
-    double weight = std::fabs(gain);
-    if (again) weight *= margin < 1 ? 1 / (1 + 3 * std::max(0.0, margin)) : 0.1;
-    add_equation(m, terms, weight);
+  }
+  const auto sum = [](const Lane& lane) {
+    double four[4], two[2];
+    for (size_t i = 0; i < 4; ++i) four[i] = lane.v[i] + lane.v[i + 4];
+    for (size_t i = 0; i < 2; ++i) two[i] = four[i] + four[i + 2];
+    return two[0] + two[1];
+  };
+  for (size_t a = 0; a < kTerms; ++a) {
+    for (size_t b = 0; b <= a; ++b) e.m[a][b] = sum(sums[a][b]);
+    e.right[a] = sum(right[a]);
   }
 }
 
@@ -143,19 +215,30 @@ AnswerFit::Sums AnswerFit::sums(const float* losses) const {
 void AnswerFit::chosen(const std::array<int8_t, kTerms>& weights, const float* first, const float* second) {
   std::array<float, kTerms> w;
   for (size_t k = 0; k < kTerms; ++k) w[k] = float(weights[k]);
-  split_sides(*samples_, w, chosen_.data());
-  for (size_t i = 0; i < count_; ++i) chosen_[i] = chosen_[i] > 0 ? first[i] : second[i];
+  split_losses(*samples_, w, first, second, chosen_.data());
+}
+
+void AnswerFit::gather(const float* first, const float* second) {
+  const size_t padded = (count_ + kLanes - 1) / kLanes * kLanes;
+  for (auto& terms : split_.terms) terms.assign(padded, 0);
+  for (auto* numbers : {&split_.gain, &split_.sign, &split_.weight}) numbers->assign(padded, 0);
+  find_gains(first, second, count_, held_out_, split_);
+  for (size_t k = 0; k < kPlaces; ++k)
+    if (samples_->place[k]) widen(samples_->place[k], count_, split_.terms[k].data());
+  split_.terms[kPlaces].assign(padded, 1);
 }
 
 // Least squares, again with what lies beyond the margin weighted less. Returns what the best form loses.
 float AnswerFit::fit_split(const float* first, const float* second, Answer& answer) {
-  std::array<double, kTerms> w{};
+  gather(first, second);
+  Form w{};
   float cost = std::numeric_limits<float>::infinity();
   for (int pass = 0; pass < 3 && cost > 0; ++pass) {
-    Matrix m{};
-    normal_equations(*samples_, first, second, held_out_ ? kHeldOut - 1 : kHeldOut, w, pass > 0, m);
-    for (size_t a = 0; a < kTerms; ++a) m[a][a] += 1e-2 * double(count_) / 16;
-    if (!solve(m, w)) break;
+    Equations equations;
+    if (pass > 0) weigh(w, split_);
+    normal_equations(split_, pass > 0 ? split_.weight : split_.gain, equations);
+    for (size_t a = 0; a < kTerms; ++a) equations.m[a][a] += 1e-2 * double(count_) / 16;
+    w = solve(equations);
     const auto tried = quantise(w);
     chosen(tried, first, second);
     const float sum = sums(chosen_.data()).training;
@@ -178,23 +261,28 @@ void AnswerFit::add_candidates(std::span<const Plane> planes, bool near) {
         std::find(candidates_.begin(), candidates_.end(), s.plane[i]) == candidates_.end())
       candidates_.push_back(s.plane[i]);
   losses_.resize(candidates_.size() * count_);
+  lengths_.resize(count_);
+  lengths_of(s, lengths_.data());
   for (size_t i = 0; i < count_; ++i) losses_[i] = s.plane[i] != kNoPlane ? 1.0f : 0.0f;
   for (size_t c = 1; c < candidates_.size(); ++c)
-    plane_losses(s, planes[candidates_[c]], near ? 0.0f : -LSP_CELL_SLACK, options_.depth_weight, 1 / size_,
-                 &losses_[c * count_]);
+    plane_losses(s, lengths_.data(), planes[candidates_[c]], near ? 0.0f : -LSP_CELL_SLACK,
+                 options_.depth_weight, 1 / size_, &losses_[c * count_]);
   if (options_.look_weight > 0) add_looks(planes);
 }
 
 // To a candidate's losses, where it is met in place of another plane.
 void AnswerFit::add_looks(std::span<const Plane> planes) {
-  const uint32_t* plane = samples_->plane;
   met_.clear();
   kinds_.resize(count_);
+  kind_of_.resize(planes.size() + 1);  // kNoPlane last; of planes that were not met, anything
   for (size_t i = 0; i < count_; ++i) {
-    size_t k = i > 0 && plane[i] == plane[i - 1] ? kinds_[i - 1] : 0;
-    while (k < met_.size() && met_[k] != plane[i]) ++k;
-    if (k == met_.size()) met_.push_back(plane[i]);
-    kinds_[i] = uint32_t(k);
+    const uint32_t plane = samples_->plane[i];
+    uint32_t& kind = kind_of_[std::min<size_t>(plane, planes.size())];
+    if (kind >= met_.size() || met_[kind] != plane) {
+      kind = uint32_t(met_.size());
+      met_.push_back(plane);
+    }
+    kinds_[i] = kind;
   }
   unlike_.resize(met_.size());
   for (size_t c = 1; c < candidates_.size(); ++c) {
@@ -206,8 +294,7 @@ void AnswerFit::add_looks(std::span<const Plane> planes) {
       most = std::max(most, unlike_[k]);
     }
     if (most == 0) continue;
-    float* losses = &losses_[c * count_];
-    for (size_t i = 0; i < count_; ++i) losses[i] = std::min(1.0f, losses[i] + unlike_[kinds_[i]]);
+    add_unlike(unlike_.data(), kinds_.data(), count_, &losses_[c * count_]);
   }
 }
 
@@ -234,8 +321,7 @@ Answer AnswerFit::choose(std::span<const Plane> planes, const ShaftSamples& samp
     size_t second = best;
     float second_sum = best_sums.training;
     for (size_t c = 0; c < candidates_.size(); ++c) {
-      const float *first = losses(best), *other = losses(c);
-      for (size_t i = 0; i < count_; ++i) chosen_[i] = std::min(first[i], other[i]);
+      lesser_losses(losses(best), losses(c), count_, chosen_.data());
       if (const float sum = sums(chosen_.data()).training; sum < second_sum) {
         second_sum = sum;
         second = c;

@@ -56,6 +56,14 @@ struct FitOptions {
 
 constexpr int kSplitWeight = 31;
 
+// Samples in double, for a split between two answers, each an array by sample; padded.
+struct SplitSamples {
+  std::array<std::vector<double>, kPlaces + 1> terms;  // places and 1
+  std::vector<double> gain;  // how much better the better answer is, 0: does not count
+  std::vector<double> sign;  // 1: the first answer is the better one, -1: the second
+  std::vector<double> weight;
+};
+
 // Chooses for samples, every fourth of which (of 24 and more) only measures. `near` where rays begin in the
 // cell: then nothing behind the origin counts.
 class AnswerFit {
@@ -72,6 +80,7 @@ class AnswerFit {
   Sums sums(const float* losses) const;
   void add_candidates(std::span<const Plane> planes, bool near);
   void add_looks(std::span<const Plane> planes);
+  void gather(const float* first, const float* second);
   float fit_split(const float* first, const float* second, Answer& answer);
   // Into chosen_: what each sample loses by a split.
   void chosen(const std::array<int8_t, kPlaces + 1>& weights, const float* first, const float* second);
@@ -82,11 +91,14 @@ class AnswerFit {
   size_t count_ = 0;
   bool held_out_ = false;
   std::vector<uint32_t> candidates_;
-  std::vector<float> losses_;    // by candidate and sample
-  std::vector<uint32_t> met_;    // the planes that the samples meet, each once
-  std::vector<uint32_t> kinds_;  // by sample: its plane's index in met_
-  std::vector<float> unlike_;    // by candidate's and met plane
-  std::vector<float> chosen_;    // of a split that is tried, by sample
+  std::vector<float> losses_;      // by candidate and sample
+  std::vector<uint32_t> met_;      // the planes that the samples meet, each once
+  std::vector<uint32_t> kind_of_;  // by plane: its index in met_
+  std::vector<uint32_t> kinds_;    // by sample: its plane's index in met_
+  std::vector<float> unlike_;      // by candidate's and met plane
+  std::vector<float> chosen_;      // of a split that is tried, by sample
+  std::vector<float> lengths_;     // of the ways of the samples
+  SplitSamples split_;             // of a split that is fitted
 };
 
 }  // namespace lsp

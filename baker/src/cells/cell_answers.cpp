@@ -37,11 +37,11 @@ uint32_t CellAnswers::plane_of(uint32_t triangle) {
   const Plane plane = {glm::vec3(normal), float(glm::dot(normal, a - glm::dvec3(centre_))),
                        colors_.empty() ? glm::vec3(0) : colors_[t.material]};
   for (uint32_t k = 0; k < planes_.size(); ++k) {
-    if ((triangles_[plane_records_[k]].flags ^ t.flags) >> LSP_TRIANGLE_GAPS_SHIFT != 0) continue;
     const float same = glm::dot(planes_[k].normal, plane.normal);
     if (std::fabs(same) > kSameDirection && unlike(planes_[k], plane) < kSameLook &&
         std::fabs(planes_[k].distance - std::copysign(plane.distance, plane.distance * same)) <
-            kSameDistance * size_)
+            kSameDistance * size_ &&
+        (triangles_[plane_records_[k]].flags ^ t.flags) >> LSP_TRIANGLE_GAPS_SHIFT == 0)
       return found = k;
   }
   planes_.push_back(plane);

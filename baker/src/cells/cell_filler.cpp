@@ -5,14 +5,16 @@
 #include <cmath>
 #include <optional>
 
-#include "../shaft_raster.h"
 #include "../vectors.h"
 #include "answer_fit.h"
 #include "box.h"
 #include "cell_answers.h"
+#include "cell_lines.h"
 #include "cell_samples.h"
+#include "clip.h"
 #include "lsp/lsp.h"
 #include "lsp/program.h"
+#include "near_rays.h"
 
 namespace lsp {
 namespace {
@@ -28,39 +30,6 @@ struct Face {
   explicit Face(uint32_t face)
       : axis(int(face / 2)), u(axis == 0 ? 1 : 0), v(axis == 2 ? 1 : 2), side(int(face % 2)) {}
 };
-
-// The surface in a sub-cell as triangles, with their areas summed up.
-struct Surface {
-  std::vector<std::array<glm::vec3, 3>> pieces;
-  std::vector<glm::vec3> normals;
-  std::vector<float> area;
-};
-
-struct Polygon {
-  glm::vec3 corner[12];
-  int count = 0;
-};
-
-// What of a triangle lies in a box.
-Polygon clip(const LspTriangle& t, const glm::vec3& lo, const glm::vec3& hi) {
-  Polygon p;
-  for (const lsp_float3& v : {t.v0, t.v1, t.v2}) p.corner[p.count++] = vec(v);
-  for (int plane = 0; plane < 6 && p.count > 0; ++plane) {
-    const int axis = plane / 2;
-    const auto inside = [&](const glm::vec3& v) {
-      return plane % 2 ? hi[axis] - v[axis] : v[axis] - lo[axis];
-    };
-    Polygon q;
-    for (int i = 0; i < p.count; ++i) {
-      const glm::vec3 &a = p.corner[i], &b = p.corner[(i + 1) % p.count];
-      const float da = inside(a), db = inside(b);
-      if (da >= 0) q.corner[q.count++] = a;
-      if ((da > 0 && db < 0) || (da < 0 && db > 0)) q.corner[q.count++] = a + (b - a) * (da / (da - db));
-    }
-    p = q;
-  }
-  return p;
-}
 
 // The lines between a patch and all patches of another side. They share their places in the patches and their
 // beginnings; the first and the last thing that a line meets answer the shafts of both directions.
@@ -115,11 +84,6 @@ FitOptions fit_options(const CellScene& scene) {
   if (scene.colors.empty()) options.look_weight = 0;
   return options;
 }
-
-struct LineHits {
-  std::vector<float> t;
-  std::vector<uint32_t> records;
-};
 
 // Rays that begin in a sub-cell, sorted by entry, each quantity an array by ray.
 struct NearSamples {
@@ -181,7 +145,11 @@ class Filler {
     Mesh mesh;
     for (uint32_t i = 0; i < cell_.count; ++i) {
       const LspTriangle& t = scene_.triangles[records_[i]];
-      for (const lsp_float3& v : {t.v0, t.v1, t.v2}) mesh.positions.push_back(vec(v));
+      bounds_.emplace_back();
+      for (const lsp_float3& v : {t.v0, t.v1, t.v2}) {
+        mesh.positions.push_back(vec(v));
+        bounds_.back().grow(vec(v));
+      }
       mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
     }
     const Box box = {lo_ - scene_.grid.margin, lo_ + size_ + scene_.grid.margin};
@@ -233,13 +201,7 @@ class Filler {
   void fill_far() {
     const uint32_t n = scene_.options.far_patches, patches = n * n;
     out_.far.assign(30u * patches * patches, LSP_ANSWER_EMPTY);
-    ends_.resize(patches);
-    for (LineHits* hits : {&first_, &last_}) {
-      hits->t.resize(patches);
-      hits->records.resize(patches);
-    }
-    raster_.emplace(lo_, lo_ + size_, n);
-    for (uint32_t i = 0; i < cell_.count; ++i) raster_->add(scene_.triangles[records_[i]], i);
+    lines_.emplace(scene_.triangles, records_, Box{lo_, lo_ + size_}, scene_.grid.margin);
     for (uint32_t in = 0; in < 6; ++in)
       for (uint32_t out = in + 1; out < 6; ++out)
         for (uint32_t p = 0; p < patches; ++p) fill_row(in, p, out);
@@ -252,7 +214,7 @@ class Filler {
     for (uint32_t q = 0; q < patches; ++q) wanted_[q] = q;
     const Sequence<4> sequence((number_ * 6 + in) * patches + p);
     const Face from(in);
-    raster_->narrow(patch_point(from, p, n, 0, 0), patch_point(from, p, n, 1, 1), out, scene_.grid.margin);
+    lines_->aim({patch_point(from, p, n, 0, 0), patch_point(from, p, n, 1, 1)}, out);
     for (uint32_t i = 0; i < row_.lines && !wanted_.empty(); ++i) {
       cast(in, p, out, i, sequence(i));
       if (i + 1 == kFirst || i + 1 == kBeforeEmpty)
@@ -271,32 +233,41 @@ class Filler {
     const uint32_t n = scene_.options.far_patches;
     const Face face_in(in), face_out(out);
     const glm::vec3 a = patch_point(face_in, p, n, r[0], r[1]);
-    for (uint32_t q = 0; q < n * n; ++q) ends_[q] = patch_point(face_out, q, n, r[2], r[3]);
-    raster_->cast(a, out, r[2], r[3], ends_, {first_.t, first_.records}, {last_.t, last_.records});
     for (size_t k = 0; k < 4; ++k) row_.place[k][i] = 2 * r[k] - 1;
     for (int k = 0; k < 3; ++k) row_.origin[size_t(k)][i] = a[k] - centre_[k];
-    for (uint32_t q : wanted_) {
-      const size_t at = q * row_.lines + i;
-      for (int k = 0; k < 3; ++k) row_.way[size_t(k)][at] = ends_[q][k] - a[k];
-      const bool any = first_.records[q] != LSP_NONE;
-      row_.t_first[at] = first_.t[q];
-      row_.t_last[at] = 1 - last_.t[q];
-      row_.plane_first[at] = any ? answers_.plane_of(first_.records[q]) : kNoPlane;
-      row_.plane_last[at] = any ? answers_.plane_of(last_.records[q]) : kNoPlane;
-      ++row_.count[q];
+    for (size_t begin = 0; begin < wanted_.size(); begin += CellLines::kMost) {
+      const auto part = std::span(wanted_).subspan(begin, std::min(CellLines::kMost, wanted_.size() - begin));
+      ends_.clear();
+      for (uint32_t q : part) ends_.push_back(patch_point(face_out, q, n, r[2], r[3]));
+      lines_->cast(a, ends_, first_, last_);
+      for (size_t j = 0; j < part.size(); ++j) add_line(part[j], i, ends_[j] - a, j);
     }
+  }
+
+  // Line i of a shaft of the row, the one that was cast as number j.
+  void add_line(uint32_t q, uint32_t i, const glm::vec3& way, size_t j) {
+    const size_t at = q * row_.lines + i;
+    for (int k = 0; k < 3; ++k) row_.way[size_t(k)][at] = way[k];
+    const bool any = first_.triangle[j] != LSP_NONE;
+    row_.t_first[at] = first_.t[j];
+    row_.t_last[at] = 1 - last_.t[j];
+    row_.plane_first[at] = any ? answers_.plane_of(first_.triangle[j]) : kNoPlane;
+    row_.plane_last[at] = any ? answers_.plane_of(last_.triangle[j]) : kNoPlane;
+    ++row_.count[q];
   }
 
   // ---- origin tables ----
 
-  void gather(const glm::vec3& lo, const glm::vec3& hi, Surface& surface) const {
+  void gather(const Box& box, Surface& surface) const {
     surface.pieces.clear();
     surface.normals.clear();
     surface.area.clear();
     float sum = 0;
-    for (const uint32_t r : records_) {
-      const LspTriangle& t = scene_.triangles[r];
-      const Polygon p = clip(t, lo, hi);
+    const Box reach = {box.lo - scene_.grid.margin, box.hi + scene_.grid.margin};
+    for (uint32_t i = 0; i < cell_.count; ++i) {
+      if (intersection(bounds_[i], reach).empty()) continue;
+      const LspTriangle& t = scene_.triangles[records_[i]];
+      const Polygon p = clip(t, box.lo, box.hi);
       if (p.count < 3) continue;
       const glm::vec3 normal = glm::cross(vec(t.v1) - vec(t.v0), vec(t.v2) - vec(t.v0));
       const float length = glm::length(normal);
@@ -319,7 +290,7 @@ class Filler {
     for (int s = 0; s < n * n * n; ++s) {
       const glm::vec3 at(float(s % n), float(s / n % n), float(s / n / n));
       const glm::vec3 lo = lo_ + at * edge;
-      gather(lo - kSubMargin * edge, lo + (1 + kSubMargin) * edge, surface);
+      gather({lo - kSubMargin * edge, lo + (1 + kSubMargin) * edge}, surface);
       if (surface.pieces.empty()) continue;
       out_.sub_mask |= uint64_t(1) << s;
       fill_sub_cell(lo, edge, surface, uint32_t(s));
@@ -343,26 +314,29 @@ class Filler {
     uint32_t entry;
   };
 
-  // Rays from the surface of a sub-cell as a renderer sends them, cosine-distributed from both sides, sorted
-  // by the patch of the cell through which they leave.
+  // By rays from the surface of a sub-cell, sorted by the patch of the cell through which they leave.
   void fill_sub_cell(const glm::vec3& lo, float edge, const Surface& surface, uint32_t sub) {
     const uint32_t m = scene_.options.origin_patches, entries = 6 * m * m;
     const uint32_t in_round = entries * scene_.options.origin_samples / kRounds;
     const Sequence<5> sequence(number_ * 64 + sub);
+    const SubCell at = {lo_, size_, lo, edge, m, scene_.offset};
     near_.clear();
     met_.assign(entries, {});
     for (uint32_t round = 0; round < kRounds; ++round) {
       const size_t first = near_.size();
       rays_.clear();
-      for (uint32_t i = round * in_round; i < (round + 1) * in_round; ++i)
-        add_near(surface, sequence(i), i % 2 != 0, lo, edge, m);
+      const uint32_t end = (round + 1) * in_round;
+      for (uint32_t i = round * in_round; i < end; i += NearRays::kMost) {
+        batch_.make(surface, sequence, i, at);
+        add_near(batch_, std::min<size_t>(NearRays::kMost, end - i));
+      }
       trace_near(first);
     }
     sort_near(entries);
-    size_t at = 0;
+    size_t begin = 0;
     for (const Entry& e : met_) {
-      out_.origin.push_back(entry_of(e, at));
-      at += e.count;
+      out_.origin.push_back(entry_of(e, begin));
+      begin += e.count;
     }
   }
 
@@ -421,50 +395,19 @@ class Filler {
     }
   }
 
-  // A ray from the surface, to near_ and rays_ unless its entry is settled.
-  void add_near(const Surface& surface, const std::array<float, 5>& r, bool back, const glm::vec3& lo,
-                float edge, uint32_t m) {
-    const float wanted = r[0] * surface.area.back();
-    const size_t piece = std::min(
-        size_t(std::upper_bound(surface.area.begin(), surface.area.end(), wanted) - surface.area.begin()),
-        surface.area.size() - 1);
-    const auto& [a, b, c] = surface.pieces[piece];
-    const float root = std::sqrt(r[1]), w1 = root * (1 - r[2]), w2 = root * r[2];
-    const glm::vec3 normal = back ? -surface.normals[piece] : surface.normals[piece];
-    const glm::vec3 origin = a + (b - a) * w1 + (c - a) * w2 + normal * scene_.offset;
-    const glm::vec3 direction = cosine_about(normal, r[3], r[4]);
-    // Where it leaves the cell.
-    float way = INFINITY;
-    uint32_t axis = 0;
-    for (int k = 0; k < 3; ++k) {
-      if (direction[k] == 0) continue;
-      const float side = direction[k] > 0 ? lo_[k] + size_ : lo_[k];
-      const float t = (side - origin[k]) / direction[k];
-      if (t < way) {
-        way = t;
-        axis = uint32_t(k);
-      }
+  // The rays of a batch up to `count`, to near_ and rays_ unless their entries are settled.
+  void add_near(const NearRays& batch, size_t count) {
+    for (size_t i = 0; i < count; ++i) {
+      const uint32_t entry = batch.entry[i];
+      if (entry == NearRays::kNone || met_[entry].settled()) continue;
+      NearRay& ray = near_.emplace_back();
+      ray.entry = entry;
+      for (size_t k = 0; k < kPlaces; ++k) ray.place[k] = batch.place[k][i];
+      const glm::vec3 origin(batch.origin[0][i], batch.origin[1][i], batch.origin[2][i]);
+      ray.origin = origin - centre_;
+      ray.way = {batch.way[0][i], batch.way[1][i], batch.way[2][i]};
+      rays_.push_back({f3(origin), 0.0f, f3(ray.way), 1.0f});
     }
-    if (!(way > 0) || !std::isfinite(way)) return;
-    const uint32_t face = 2 * axis + (direction[int(axis)] > 0 ? 1 : 0);
-    const Face f(face);
-    const glm::vec3 end = origin + direction * way;
-    const auto patch = [&](float x, float& place) {
-      const float q = std::clamp(x / size_ * float(m), 0.0f, float(m));
-      const uint32_t i = std::min(uint32_t(q), m - 1);
-      place = 2 * (q - float(i)) - 1;
-      return i;
-    };
-    NearRay ray{};
-    const uint32_t u = patch(end[f.u] - lo_[f.u], ray.place[3]);
-    const uint32_t v = patch(end[f.v] - lo_[f.v], ray.place[4]);
-    ray.entry = face * m * m + u + m * v;
-    if (met_[ray.entry].settled()) return;
-    for (int k = 0; k < 3; ++k) ray.place[size_t(k)] = (origin[k] - lo[k]) * (2 / edge) - 1.0f;
-    ray.origin = origin - centre_;
-    ray.way = direction * way;
-    near_.push_back(ray);
-    rays_.push_back({f3(origin), 0.0f, f3(ray.way), 1.0f});
   }
 
   const CellScene& scene_;
@@ -473,6 +416,7 @@ class Filler {
   const float size_;
   const glm::vec3 lo_, centre_;
   std::span<const uint32_t> records_;
+  std::vector<Box> bounds_;  // of the cell's triangles
   CellAnswers answers_;
   AnswerFit fit_;
   FilledCell out_;
@@ -483,13 +427,14 @@ class Filler {
   lsp_scene own_{};
 
   // Of the row that is being filled.
-  std::optional<ShaftRaster> raster_;
+  std::optional<CellLines> lines_;
   Row row_;
   std::vector<uint32_t> wanted_;  // patches whose shafts are not settled
-  std::vector<glm::vec3> ends_;   // of a line, by patch
-  LineHits first_, last_;         // of its lines, by patch
+  std::vector<glm::vec3> ends_;   // of lines that are cast at once
+  CellLines::Hits first_, last_;  // of these
 
   // Of the sub-cell that is being filled.
+  NearRays batch_;
   std::vector<NearRay> near_;
   std::vector<Entry> met_;
   NearSamples sorted_;

@@ -3,9 +3,7 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
-#include <glm/glm.hpp>
 
 #include "../pcg.h"
 
@@ -37,34 +35,5 @@ class Sequence {
  private:
   std::array<float, kDimensions> start_;
 };
-
-// The point of the unit circle at `turns` in [0, 1), by polynomials: a library's sine may differ between
-// machines.
-inline glm::vec2 circle(float turns) {
-  const float quarter = std::floor(4 * turns), x = (4 * turns - quarter - 0.5f) * 1.57079633f, x2 = x * x;
-  const float s = x * (1 - x2 * (1 / 6.0f - x2 * (1 / 120.0f - x2 / 5040)));
-  const float c = 1 - x2 * (0.5f - x2 * (1 / 24.0f - x2 * (1 / 720.0f)));
-  switch (int(quarter)) {
-    case 0:
-      return {c, s};
-    case 1:
-      return {-s, c};
-    case 2:
-      return {-c, -s};
-    default:
-      return {s, -c};
-  }
-}
-
-// A cosine-distributed direction about a unit normal from a point of the unit square (Duff et al., "Building
-// an Orthonormal Basis, Revisited", 2017).
-inline glm::vec3 cosine_about(const glm::vec3& n, float a, float b) {
-  const float sign = n.z >= 0 ? 1.0f : -1.0f;
-  const float p = -1 / (sign + n.z), q = n.x * n.y * p;
-  const glm::vec3 u(1 + sign * n.x * n.x * p, sign * q, -sign * n.x), v(q, sign + n.y * n.y * p, -n.y);
-  const float radius = std::sqrt(a);
-  const glm::vec2 turn = circle(b);
-  return u * (radius * turn.x) + v * (radius * turn.y) + n * std::sqrt(std::max(0.0f, 1 - a));
-}
 
 }  // namespace lsp

@@ -86,11 +86,15 @@ CellTables fill_cell_tables(const CellGrid& grid, const WideTree& tree, const Ls
   for (size_t begin = 0; begin < cells; begin += kBatch) {
     const size_t end = std::min(cells, begin + kBatch);
     std::vector<FilledCell> filled(end - begin);
-    tbb::parallel_for(begin, end, [&](size_t i) {
-      filled[i - begin] = fill_cell(scene, uint32_t(options.shard.item(i)));
-      const size_t now = ++done;
-      if (progress && now % 16 == 0) progress(double(now) / double(cells));
-    });
+    const auto fill = [&](const tbb::blocked_range<size_t>& range) {
+      for (size_t i = range.begin(); i < range.end(); ++i) {
+        filled[i - begin] = fill_cell(scene, uint32_t(options.shard.item(i)));
+        const size_t now = ++done;
+        if (progress && now % 16 == 0) progress(double(now) / double(cells));
+      }
+    };
+    // One at a time: cells differ much in what they take.
+    tbb::parallel_for(tbb::blocked_range<size_t>(begin, end, 1), fill, tbb::simple_partitioner());
     for (const FilledCell& f : filled) add_to(tables, f, grid.size);
   }
   return tables.finish();

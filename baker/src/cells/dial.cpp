@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <span>
 
 #include "../surface_rays.h"
@@ -60,7 +61,8 @@ struct Rays {
   std::vector<LspRay> rays;  // kPerPoint of each point, one after the other
   std::vector<View> views;   // of them
   std::vector<LspHit> truth;
-  lsp_trace_counts counts{};  // of exact rays
+  lsp_trace_counts counts{};               // of exact rays
+  std::map<uint32_t, DialError> measured;  // by dial: what is known already
 };
 
 std::vector<LspHit> trace(const lsp_scene& scene, const lsp_trace_options& options,
@@ -121,11 +123,11 @@ class Dial {
   }
 
   // Of a quality as the header states it: the worst error of any set, and the gain over all rays.
-  QualityFigures figures(uint32_t quality) const {
+  QualityFigures figures(uint32_t quality) {
     QualityFigures out;
     lsp_trace_counts exact{}, cells{};
-    for (const Rays& set : sets_) {
-      const DialError error = measure(set, quality);
+    for (Rays& set : sets_) {
+      const DialError& error = measured(set, quality);
       out.wrong = std::max(out.wrong, error.wrong);
       out.depth = std::max(out.depth, error.depth);
       out.occlusion = std::max(out.occlusion, error.picture);
@@ -152,27 +154,33 @@ class Dial {
     for (size_t near = 0, far = heeded(kClasses, most >> 8u); near < nears && far > 0;) {
       const uint32_t dial = LSP_DIAL(kClasses[near], kClasses[far - 1]);
       header_.quality[LSP_QUALITY_BALANCED] = dial;
-      double cost = 0;
-      bool kept = true;
-      for (const Rays& set : sets_) {
-        const DialError error = measure(set, LSP_QUALITY_BALANCED);
-        cost += kVulkan.cells(error.counts);
-        kept = kept && within(error, wrong);
-        if (!kept) break;
+      if (!keeps(wrong)) {
+        --far;
+        continue;
       }
-      if (kept && cost < least) {
+      double cost = 0;
+      for (Rays& set : sets_) cost += kVulkan.cells(measured(set, LSP_QUALITY_BALANCED).counts);
+      if (cost < least) {
         least = cost;
         best = dial;
       }
-      if (kept)
-        ++near;
-      else
-        --far;
+      ++near;
     }
     return best;
   }
 
  private:
+  // Whether the header's `balanced` keeps within errors with all rays: those that did not the last time most
+  // likely do not now, and then spare the others.
+  bool keeps(double wrong) {
+    if (!within(measured(sets_[worst_], LSP_QUALITY_BALANCED), wrong)) return false;
+    for (size_t i = 0; i < sets_.size(); ++i)
+      if (!within(measured(sets_[i], LSP_QUALITY_BALANCED), wrong)) {
+        worst_ = i;
+        return false;
+      }
+    return true;
+  }
   // How many of these classes, which ascend, are no more than `most`.
   static size_t heeded(std::span<const uint32_t> classes, uint32_t most) {
     return size_t(std::upper_bound(classes.begin(), classes.end(), most) - classes.begin());
@@ -223,6 +231,13 @@ class Dial {
     return open.off / std::max(0.25 * view.pixels, open.truth);
   }
 
+  // The searches for two qualities, and their figures, ask for the same dials.
+  const DialError& measured(Rays& set, uint32_t quality) const {
+    const auto [known, added] = set.measured.try_emplace(header_.quality[quality]);
+    if (added) known->second = measure(set, quality);
+    return known->second;
+  }
+
   DialError measure(const Rays& set, uint32_t quality) const {
     DialError error;
     lsp_trace_options options{};
@@ -259,6 +274,7 @@ class Dial {
   std::vector<float> brightness_;   // by material; empty: light does not count
   std::vector<uint32_t> material_;  // by primitive
   std::array<Rays, 3> sets_;
+  size_t worst_ = 0;  // the set that last did not keep within errors
 };
 
 }  // namespace
