@@ -127,26 +127,11 @@ Chosen climb(const Mesh& mesh, Arguments& a, const Progress& progress) {
   return chosen;
 }
 
-// Throws where more triangles meet in one corner than a cell can hold: no grid is fine enough, and looking
-// for one takes hours.
-void check_corners(const Mesh& mesh) {
-  std::vector<uint32_t> meet(mesh.positions.size());
-  uint32_t most = 0;
-  for (const glm::uvec3& triangle : mesh.triangles)
-    for (int k = 0; k < 3; ++k) most = std::max(most, ++meet[triangle[k]]);
-  if (most > kMostInCell)
-    throw Failure(Exit::kLimit, "",
-                  with_commas(most) + " triangles meet in one corner, and a cell can hold " +
-                      with_commas(kMostInCell) +
-                      ": give --base wide for exact rays alone, or --base bvh for tables of another kind");
-}
-
 // Where tables are weighed, exact rays alone do for a scene of which no grid can be made: a detail so small
 // or so crowded that one cell would hold too much of it.
 Baked bake_cells_or_wide(const Mesh& mesh, Arguments& a, const Progress& progress) {
   std::string why;
   try {
-    check_corners(mesh);
     return bake(mesh, bake_options(a), progress);
   } catch (const Failure& failure) {
     if (failure.exit() != Exit::kLimit || !a.weigh_tables) throw;
@@ -279,7 +264,6 @@ Baked bake_shard(const Mesh& mesh, const Arguments& a, const Shard& shard, const
   BakeOptions options = bake_options(a);
   options.cell_tables.shard = shard;
   options.finish = false;
-  check_corners(mesh);
   return bake(mesh, options, progress);
 }
 

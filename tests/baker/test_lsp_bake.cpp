@@ -124,24 +124,28 @@ TEST_F(LspBake, SmallThingsStaySmall) {
   EXPECT_GT(bytes_of(nlohmann::json::parse(read("out"))).tables, 0u) << "asked for";
 }
 
-// A cone whose triangles all meet at its tip, and as many specks in one cell of any grid.
+// A cone whose triangles all meet at its tip, one whose tips differ by a rounding, and as many specks in one
+// cell of any grid.
 TEST_F(LspBake, WhatNoCellCanHoldHasExactRaysAlone) {
   constexpr int kTriangles = 9000;
-  std::ofstream cone(folder_ / "cone.obj"), specks(folder_ / "specks.obj");
+  std::ofstream cone(folder_ / "cone.obj"), brush(folder_ / "brush.obj"), specks(folder_ / "specks.obj");
   cone << "v 0 1 0\n";
   specks << "v -9 -9 -9\nv 9 9 9\nv -9 9 9\nf 1 2 3\n";
   for (int i = 0; i < kTriangles; ++i) {
     const double angle = 6.283185307179586 * i / kTriangles, x = std::cos(angle), z = std::sin(angle);
     cone << "v " << x << " 0 " << z << "\n";
     cone << "f 1 " << i + 2 << " " << (i + 1) % kTriangles + 2 << "\n";
+    brush << "v " << 1e-6 * x << " 1 " << 1e-6 * z << "\nv " << x << " 0 " << z << "\nv " << x - 1e-3 * z
+          << " 0 " << z + 1e-3 * x << "\nf -3 -2 -1\n";
     specks << "v " << x / 1000 << " " << (i + 1) * 1e-6 << " " << z / 1000 << "\nv 0 " << i * 1e-6
            << " 1e-5\nv 0 " << i * 1e-6 << " 0\nf -3 -2 -1\n";
   }
-  cone.close();
-  specks.close();
+  for (std::ofstream* file : {&cone, &brush, &specks}) file->close();
   const auto start = std::chrono::steady_clock::now();
-  const std::pair<const char*, const char*> cases[] = {{"cone", "9,000 triangles meet in one corner"},
-                                                       {"specks", "a cell would hold 900"}};
+  const std::pair<const char*, const char*> cases[] = {
+      {"cone", "a cell of the finest grid would hold 9,000 triangles"},
+      {"brush", "a cell of the finest grid would hold 9,000 triangles"},
+      {"specks", "a cell of the finest grid would hold 9,00"}};
   for (const auto& [name, why] : cases) {
     ASSERT_EQ(run(std::string(name) + ".obj -o a.lsp --json"), 0) << read("err");
     const auto report = nlohmann::json::parse(read("out"));
@@ -152,7 +156,8 @@ TEST_F(LspBake, WhatNoCellCanHoldHasExactRaysAlone) {
   }
   EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(60)) << "not by trying every grid";
   EXPECT_EQ(run("cone.obj -o b.lsp --base cells"), 6);
-  EXPECT_NE(read("err").find("9,000 triangles meet in one corner"), std::string::npos) << read("err");
+  EXPECT_NE(read("err").find("9,000 triangles, and it can hold 8,191: give --base wide"), std::string::npos)
+      << read("err");
   EXPECT_EQ(run("cone.obj -o b.part --shard 1/2"), 6);
 }
 
