@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "accuracy.h"
+#include "box.h"
 #include "import/text.h"
 #include "lsp/program.h"
 
@@ -125,6 +126,30 @@ Chosen climb(const Mesh& mesh, Arguments& a, const Progress& progress) {
     if (100 * chosen.error.wrong_share() <= a.max_error) break;
   }
   return chosen;
+}
+
+// Throws where products of coordinates would leave the range of floats: rays would miss, and nothing say why.
+void check_range(const Mesh& mesh, const Arguments& a) {
+  constexpr float kMostReach = 1e18f, kLeastSize = 1e-15f;  // see runtime/NUMERICS.md, "Triangles"
+  const auto largest = [](const glm::vec3& v) { return std::max({v.x, v.y, v.z}); };
+  const std::string file = a.inputs.size() == 1 ? a.inputs[0].string() : "";
+  Box box;
+  char text[200];
+  for (const glm::vec3& p : mesh.positions) {
+    box.grow(p);
+    if (largest(glm::abs(p)) <= kMostReach) continue;
+    std::snprintf(
+        text, sizeof text,
+        "has a corner at (%g, %g, %g), and rays are traced up to %g units from the origin: scale the "
+        "mesh, or mend the corner",
+        double(p.x), double(p.y), double(p.z), double(kMostReach));
+    throw Failure(Exit::kInvalid, file, text);
+  }
+  if (mesh.positions.empty() || largest(box.extent()) >= kLeastSize) return;
+  std::snprintf(text, sizeof text,
+                "is %g units long, and rays are traced in scenes of %g units or more: scale the mesh",
+                double(largest(box.extent())), double(kLeastSize));
+  throw Failure(Exit::kInvalid, file, text);
 }
 
 // Where tables are weighed, exact rays alone do for a scene of which no grid can be made: a detail so small
@@ -264,10 +289,12 @@ Baked bake_shard(const Mesh& mesh, const Arguments& a, const Shard& shard, const
   BakeOptions options = bake_options(a);
   options.cell_tables.shard = shard;
   options.finish = false;
+  check_range(mesh, a);
   return bake(mesh, options, progress);
 }
 
 Chosen bake_as_asked(const Mesh& mesh, Arguments& a, const Progress& progress, const FileSize& file_size) {
+  check_range(mesh, a);
   return a.max_size ? bake_within(mesh, a, progress, file_size) : bake_accurately(mesh, a, progress);
 }
 

@@ -161,6 +161,26 @@ TEST_F(LspBake, WhatNoCellCanHoldHasExactRaysAlone) {
   EXPECT_EQ(run("cone.obj -o b.part --shard 1/2"), 6);
 }
 
+// Beyond the range in which products of coordinates are floats every ray would miss.
+TEST_F(LspBake, WhatNoRayCouldHitIsRefused) {
+  const auto write = [&](const char* name, const char* scale) {
+    std::ofstream(folder_ / name) << "v 0 0 0\nv " << scale << " 0 0\nv 0 " << scale << " 0\nf 1 2 3\n";
+  };
+  write("large.obj", "1e30");
+  write("small.obj", "1e-30");
+  for (const char* options : {"", "--base bvh", "--shard 1/2"}) {
+    EXPECT_EQ(run(std::string("large.obj -o a.lsp ") + options), 3) << options;
+    EXPECT_NE(read("err").find("large.obj: has a corner at (1e+30, 0, 0)"), std::string::npos) << read("err");
+    EXPECT_EQ(run(std::string("small.obj -o a.lsp ") + options), 3) << options;
+    EXPECT_NE(read("err").find("small.obj: is 1e-30 units long"), std::string::npos) << read("err");
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "a.lsp"));
+  for (const char* scale : {"1e17", "1e-14"}) {
+    write("held.obj", scale);
+    EXPECT_EQ(run("held.obj -o a.lsp"), 0) << read("err");
+  }
+}
+
 TEST_F(LspBake, HelpBeginsWithWhatMostPeopleNeed) {
   ASSERT_EQ(run("--help"), 0);
   const std::string help = read("out");
