@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <random>
 #include <sstream>
 #include <thread>
 
@@ -159,6 +160,36 @@ TEST_F(LspBake, WhatNoCellCanHoldHasExactRaysAlone) {
   EXPECT_NE(read("err").find("9,000 triangles, and it can hold 8,191: give --base wide"), std::string::npos)
       << read("err");
   EXPECT_EQ(run("cone.obj -o b.part --shard 1/2"), 6);
+}
+
+// Slivers through one another, and a detail for whose sake the grid would be fine everywhere.
+TEST_F(LspBake, WhatTakesTooLongToFillHasExactRaysAlone) {
+  std::ofstream slivers(folder_ / "slivers.obj"), detail(folder_ / "detail.obj");
+  std::mt19937 random(1);
+  const auto number = [&](double size) { return (random() * 0x1p-31 - 1) * size; };
+  const auto write = [&](std::ofstream& file, double size, double length, double width) {
+    const double at[] = {number(size), number(size), number(size)};
+    const double to[] = {at[0] + number(length), at[1] + number(length), at[2] + number(length)};
+    file << "v " << at[0] << " " << at[1] << " " << at[2] << "\nv " << to[0] << " " << to[1] << " " << to[2]
+         << "\nv " << to[0] + number(width) << " " << to[1] + number(width) << " " << to[2] + number(width)
+         << "\nf -3 -2 -1\n";
+  };
+  for (int i = 0; i < 9000; ++i) write(slivers, 1, 2, 0.02);
+  for (int i = 0; i < 20000; ++i) write(detail, 1e-2, 1e-3, 1e-3);
+  detail << "v 1 1 1\nv 2 1 1\nv 1 2 1\nf -3 -2 -1\n";
+  slivers.close();
+  detail.close();
+  const std::pair<const char*, const char*> cases[] = {
+      {"slivers", "boxes and triangles in a cell, on average, and filling"},
+      {"detail", "a grid of which no cell is too full has"}};
+  for (const auto& [name, why] : cases) {
+    const auto start = std::chrono::steady_clock::now();
+    ASSERT_EQ(run(std::string(name) + ".obj -o a.lsp --json"), 0) << read("err");
+    EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(60)) << name;
+    const auto report = nlohmann::json::parse(read("out"));
+    EXPECT_EQ(bytes_of(report).tables, 0u) << name;
+    EXPECT_NE(report["skipped"].dump().find(why), std::string::npos) << report["skipped"];
+  }
 }
 
 // Beyond the range in which products of coordinates are floats every ray would miss.
