@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cells/cell_filler.h"
 #include "cells/closed_ways.h"
 #include "cells/dial.h"
 #include "lsp/program.h"
@@ -85,8 +86,10 @@ double estimate_tables(BakeJob& job) {
   Baked& baked = job.baked;
   const size_t cells = baked.cell_grid.cells.size();
   CellTableOptions options = job.options.cell_tables;
+  const Shard own = options.shard;
   options.shard = {1, uint32_t(std::max<size_t>(1, cells / kSample))};
   baked.cell_tables = fill_tables(job, options);
+  job.filled = own.count == 1 && options.shard.count == 1;
   const double words = double(baked.cell_grid.words.size() * sizeof(uint32_t));
   const double filled = double(std::max<size_t>(1, baked.cell_tables.cells.size()));
   return words + (double(table_bytes(baked)) - words) * (double(cells) / filled);
@@ -106,11 +109,53 @@ void coarsen(BakeJob& job) {
     const double part = std::min(std::sqrt(0.97 * kSafe * most / tables), 1 - 1 / longest);
     try {
       grid = build_cell_grid(job.baked.triangles, job.bounds, std::max(1u, uint32_t(longest * part)));
+      job.filled = false;
     } catch (const Failure& failure) {
       if (failure.exit() != Exit::kLimit) throw;
       return;  // a cell of that grid would hold too many triangles
     }
   }
+}
+
+// Boxes and triangles that a ray tests in a cell, on average over some cells from all over the grid.
+double tests_of_rays(const BakeJob& job) {
+  constexpr size_t kSample = 64;
+  const CellGrid& grid = job.baked.cell_grid;
+  const Shard sample{1, uint32_t(std::max<size_t>(1, grid.cells.size() / kSample))};
+  const size_t count = sample.share_of(grid.cells.size());
+  double tests = 0;
+  for (size_t i = 0; i < count; ++i)
+    tests += tests_of_ray(grid, job.baked.triangles, uint32_t(sample.item(i)));
+  return tests / double(std::max<size_t>(1, count));
+}
+
+// Where triangles overlap everywhere, as in a heap of needles, a ray tests hundreds of them in a cell, and a
+// cell is filled by some hundred thousand rays: fewer cells then, and none where that does not help.
+void spare_cells(BakeJob& job, size_t most) {
+  constexpr double kHeap = 30;  // tests of a ray in a cell: 4 to 7 in rooms and objects, 100 to 500 in heaps
+  constexpr double kMostTests = 2000;  // in all cells of a heap: what filling 300 ordinary cells takes
+  Baked& baked = job.baked;
+  double tests = tests_of_rays(job);
+  if (tests < kHeap || tests * double(baked.cell_grid.cells.size()) < kMostTests) return;
+  const auto few = size_t(std::max(1.0, kMostTests / tests));
+  baked.cell_grid = choose_cell_grid(baked.triangles, job.bounds, std::min(most, few));
+  tests = tests_of_rays(job);
+  if (tests * double(baked.cell_grid.cells.size()) > 2 * kMostTests)
+    throw Failure(Exit::kLimit, "",
+                  "a ray would test " + with_commas(uint64_t(tests)) +
+                      " boxes and triangles in a cell, on average, and filling " +
+                      with_commas(baked.cell_grid.cells.size()) +
+                      " of them take too long (--base cells asks for them)");
+}
+
+// Throws where a grid that is so fine for the sake of its fullest cell has more cells than tables may fill.
+void check_crowded(const BakeJob& job, size_t most) {
+  const CellGrid& grid = job.baked.cell_grid;
+  if (!grid.crowded || grid.cells.size() <= most) return;
+  throw Failure(Exit::kLimit, "",
+                "a grid of which no cell is too full has " + with_commas(grid.cells.size()) +
+                    " filled cells, and their tables would be more than three times its exact data (--base "
+                    "cells asks for them)");
 }
 
 void build_cells_base(BakeJob& job) {
@@ -124,15 +169,18 @@ void build_cells_base(BakeJob& job) {
   // What a filled cell takes at least: 12 kB to 15 kB of objects, 20 kB of rooms.
   constexpr double kCellBytes = 12000;
   const bool any = options.table_share == 0;
-  const double most = options.table_share * double(exact_bytes(baked)) / kCellBytes;
-  baked.cell_grid = choose_cell_grid(baked.triangles, job.bounds, any ? SIZE_MAX : size_t(most));
-  if (!any) coarsen(job);
+  const size_t most = any ? SIZE_MAX : size_t(options.table_share * double(exact_bytes(baked)) / kCellBytes);
+  baked.cell_grid = choose_cell_grid(baked.triangles, job.bounds, most);
+  if (any) return;
+  check_crowded(job, most);
+  spare_cells(job, most);
+  coarsen(job);
 }
 
 void fill_cells(BakeJob& job) {
   const CellTableOptions& options = job.options.cell_tables;
   Baked& baked = job.baked;
-  baked.cell_tables = fill_tables(job, options);
+  if (!job.filled) baked.cell_tables = fill_tables(job, options);
   set_cells(baked.cell_grid, baked.cell_tables, options, baked.header);
   const size_t cells = baked.cell_grid.words.size();
   baked.skipped.push_back("empty cells: " + with_commas(cells - baked.cell_grid.cells.size()) + " of " +

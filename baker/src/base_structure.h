@@ -17,6 +17,7 @@ struct BakeJob {
   Bvh bvh;
   Box bounds;
   Baked& baked;
+  bool filled = false;  // its tables are there: to know their size took filling all of them
 
   std::function<void(double)> stage(const char* name) const {
     return [&progress = progress, name](double done) {

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "accuracy.h"
+#include "box.h"
 #include "import/text.h"
 #include "lsp/program.h"
 
@@ -130,18 +131,28 @@ Chosen climb(const Mesh& mesh, Arguments& a, const Progress& progress) {
   return chosen;
 }
 
-// Throws where more triangles meet in one corner than a cell can hold: no grid is fine enough, and looking
-// for one takes hours.
-void check_corners(const Mesh& mesh) {
-  std::vector<uint32_t> meet(mesh.positions.size());
-  uint32_t most = 0;
-  for (const glm::uvec3& triangle : mesh.triangles)
-    for (int k = 0; k < 3; ++k) most = std::max(most, ++meet[triangle[k]]);
-  if (most > kMostInCell)
-    throw Failure(Exit::kLimit, "",
-                  with_commas(most) + " triangles meet in one corner, and a cell can hold " +
-                      with_commas(kMostInCell) +
-                      ": give --base wide for exact rays alone, or --base bvh for tables of another kind");
+// Throws where products of coordinates would leave the range of floats: rays would miss, and nothing say why.
+void check_range(const Mesh& mesh, const Arguments& a) {
+  constexpr float kMostReach = 1e18f, kLeastSize = 1e-15f;  // see runtime/NUMERICS.md, "Triangles"
+  const auto largest = [](const glm::vec3& v) { return std::max({v.x, v.y, v.z}); };
+  const std::string file = a.inputs.size() == 1 ? a.inputs[0].string() : "";
+  Box box;
+  char text[200];
+  for (const glm::vec3& p : mesh.positions) {
+    box.grow(p);
+    if (largest(glm::abs(p)) <= kMostReach) continue;
+    std::snprintf(
+        text, sizeof text,
+        "has a corner at (%g, %g, %g), and rays are traced up to %g units from the origin: scale the "
+        "mesh, or mend the corner",
+        double(p.x), double(p.y), double(p.z), double(kMostReach));
+    throw Failure(Exit::kInvalid, file, text);
+  }
+  if (mesh.positions.empty() || largest(box.extent()) >= kLeastSize) return;
+  std::snprintf(text, sizeof text,
+                "is %g units long, and rays are traced in scenes of %g units or more: scale the mesh",
+                double(largest(box.extent())), double(kLeastSize));
+  throw Failure(Exit::kInvalid, file, text);
 }
 
 // Where tables are weighed, exact rays alone do for a scene of which no grid can be made: a detail so small
@@ -149,7 +160,6 @@ void check_corners(const Mesh& mesh) {
 Baked bake_cells_or_wide(const Mesh& mesh, Arguments& a, const Progress& progress) {
   std::string why;
   try {
-    check_corners(mesh);
     return bake(mesh, bake_options(a), progress);
   } catch (const Failure& failure) {
     if (failure.exit() != Exit::kLimit || !a.weigh_tables) throw;
@@ -282,11 +292,12 @@ Baked bake_shard(const Mesh& mesh, const Arguments& a, const Shard& shard, const
   BakeOptions options = bake_options(a);
   options.cell_tables.shard = shard;
   options.finish = false;
-  check_corners(mesh);
+  check_range(mesh, a);
   return bake(mesh, options, progress);
 }
 
 Chosen bake_as_asked(const Mesh& mesh, Arguments& a, const Progress& progress, const FileSize& file_size) {
+  check_range(mesh, a);
   return a.max_size ? bake_within(mesh, a, progress, file_size) : bake_accurately(mesh, a, progress);
 }
 

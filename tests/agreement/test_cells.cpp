@@ -359,8 +359,11 @@ TEST(Cells, ACrowdedCellIsDividedOrRefused) {
     FAIL() << "8 cells hold the sphere in one or two of them";
   } catch (const Failure& f) {
     EXPECT_EQ(f.exit(), Exit::kLimit);
-    EXPECT_NE(std::string(f.what()).find("--cells"), std::string::npos) << f.what();
+    const std::string what = f.what(), remedy = ": give --cells ";
+    ASSERT_NE(what.find(remedy), std::string::npos) << what;
+    options.cells = uint32_t(std::stoul(what.substr(what.find(remedy) + remedy.size())));
   }
+  for (const Cell& cell : bake(mesh, options).cell_grid.cells) EXPECT_LE(cell.count, kMostInCell);
   options.cells = 0;
   const lsp::Baked chosen = bake(mesh, options);
   for (const Cell& cell : chosen.cell_grid.cells) EXPECT_LE(cell.count, kMostInCell);

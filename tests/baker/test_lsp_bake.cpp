@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <random>
 #include <sstream>
 #include <thread>
 
@@ -124,24 +125,28 @@ TEST_F(LspBake, SmallThingsStaySmall) {
   EXPECT_GT(bytes_of(nlohmann::json::parse(read("out"))).tables, 0u) << "asked for";
 }
 
-// A cone whose triangles all meet at its tip, and as many specks in one cell of any grid.
+// A cone whose triangles all meet at its tip, one whose tips differ by a rounding, and as many specks in one
+// cell of any grid.
 TEST_F(LspBake, WhatNoCellCanHoldHasExactRaysAlone) {
   constexpr int kTriangles = 9000;
-  std::ofstream cone(folder_ / "cone.obj"), specks(folder_ / "specks.obj");
+  std::ofstream cone(folder_ / "cone.obj"), brush(folder_ / "brush.obj"), specks(folder_ / "specks.obj");
   cone << "v 0 1 0\n";
   specks << "v -9 -9 -9\nv 9 9 9\nv -9 9 9\nf 1 2 3\n";
   for (int i = 0; i < kTriangles; ++i) {
     const double angle = 6.283185307179586 * i / kTriangles, x = std::cos(angle), z = std::sin(angle);
     cone << "v " << x << " 0 " << z << "\n";
     cone << "f 1 " << i + 2 << " " << (i + 1) % kTriangles + 2 << "\n";
+    brush << "v " << 1e-6 * x << " 1 " << 1e-6 * z << "\nv " << x << " 0 " << z << "\nv " << x - 1e-3 * z
+          << " 0 " << z + 1e-3 * x << "\nf -3 -2 -1\n";
     specks << "v " << x / 1000 << " " << (i + 1) * 1e-6 << " " << z / 1000 << "\nv 0 " << i * 1e-6
            << " 1e-5\nv 0 " << i * 1e-6 << " 0\nf -3 -2 -1\n";
   }
-  cone.close();
-  specks.close();
+  for (std::ofstream* file : {&cone, &brush, &specks}) file->close();
   const auto start = std::chrono::steady_clock::now();
-  const std::pair<const char*, const char*> cases[] = {{"cone", "9,000 triangles meet in one corner"},
-                                                       {"specks", "a cell would hold 900"}};
+  const std::pair<const char*, const char*> cases[] = {
+      {"cone", "a cell of the finest grid would hold 9,000 triangles"},
+      {"brush", "a cell of the finest grid would hold 9,000 triangles"},
+      {"specks", "a cell of the finest grid would hold 9,00"}};
   for (const auto& [name, why] : cases) {
     ASSERT_EQ(run(std::string(name) + ".obj -o a.lsp --json"), 0) << read("err");
     const auto report = nlohmann::json::parse(read("out"));
@@ -152,8 +157,59 @@ TEST_F(LspBake, WhatNoCellCanHoldHasExactRaysAlone) {
   }
   EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(60)) << "not by trying every grid";
   EXPECT_EQ(run("cone.obj -o b.lsp --base cells"), 6);
-  EXPECT_NE(read("err").find("9,000 triangles meet in one corner"), std::string::npos) << read("err");
+  EXPECT_NE(read("err").find("9,000 triangles, and it can hold 8,191: give --base wide"), std::string::npos)
+      << read("err");
   EXPECT_EQ(run("cone.obj -o b.part --shard 1/2"), 6);
+}
+
+// Slivers through one another, and a detail for whose sake the grid would be fine everywhere.
+TEST_F(LspBake, WhatTakesTooLongToFillHasExactRaysAlone) {
+  std::ofstream slivers(folder_ / "slivers.obj"), detail(folder_ / "detail.obj");
+  std::mt19937 random(1);
+  const auto number = [&](double size) { return (random() * 0x1p-31 - 1) * size; };
+  const auto write = [&](std::ofstream& file, double size, double length, double width) {
+    const double at[] = {number(size), number(size), number(size)};
+    const double to[] = {at[0] + number(length), at[1] + number(length), at[2] + number(length)};
+    file << "v " << at[0] << " " << at[1] << " " << at[2] << "\nv " << to[0] << " " << to[1] << " " << to[2]
+         << "\nv " << to[0] + number(width) << " " << to[1] + number(width) << " " << to[2] + number(width)
+         << "\nf -3 -2 -1\n";
+  };
+  for (int i = 0; i < 9000; ++i) write(slivers, 1, 2, 0.02);
+  for (int i = 0; i < 20000; ++i) write(detail, 1e-2, 1e-3, 1e-3);
+  detail << "v 1 1 1\nv 2 1 1\nv 1 2 1\nf -3 -2 -1\n";
+  slivers.close();
+  detail.close();
+  const std::pair<const char*, const char*> cases[] = {
+      {"slivers", "boxes and triangles in a cell, on average, and filling"},
+      {"detail", "a grid of which no cell is too full has"}};
+  for (const auto& [name, why] : cases) {
+    const auto start = std::chrono::steady_clock::now();
+    ASSERT_EQ(run(std::string(name) + ".obj -o a.lsp --json"), 0) << read("err");
+    EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(60)) << name;
+    const auto report = nlohmann::json::parse(read("out"));
+    EXPECT_EQ(bytes_of(report).tables, 0u) << name;
+    EXPECT_NE(report["skipped"].dump().find(why), std::string::npos) << report["skipped"];
+  }
+}
+
+// Beyond the range in which products of coordinates are floats every ray would miss.
+TEST_F(LspBake, WhatNoRayCouldHitIsRefused) {
+  const auto write = [&](const char* name, const char* scale) {
+    std::ofstream(folder_ / name) << "v 0 0 0\nv " << scale << " 0 0\nv 0 " << scale << " 0\nf 1 2 3\n";
+  };
+  write("large.obj", "1e30");
+  write("small.obj", "1e-30");
+  for (const char* options : {"", "--base bvh", "--shard 1/2"}) {
+    EXPECT_EQ(run(std::string("large.obj -o a.lsp ") + options), 3) << options;
+    EXPECT_NE(read("err").find("large.obj: has a corner at (1e+30, 0, 0)"), std::string::npos) << read("err");
+    EXPECT_EQ(run(std::string("small.obj -o a.lsp ") + options), 3) << options;
+    EXPECT_NE(read("err").find("small.obj: is 1e-30 units long"), std::string::npos) << read("err");
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "a.lsp"));
+  for (const char* scale : {"1e17", "1e-14"}) {
+    write("held.obj", scale);
+    EXPECT_EQ(run("held.obj -o a.lsp"), 0) << read("err");
+  }
 }
 
 TEST_F(LspBake, HelpBeginsWithWhatMostPeopleNeed) {

@@ -111,6 +111,23 @@ struct NearSamples {
   }
 };
 
+// A tree of a cell's triangles, numbered from 0, clipped to the cell.
+Bvh tree_of(const CellGrid& grid, std::span<const LspTriangle> triangles, const Cell& cell, Mesh& mesh) {
+  for (uint32_t i = 0; i < cell.count; ++i) {
+    const LspTriangle& t = triangles[grid.records[cell.first + i]];
+    for (const lsp_float3& v : {t.v0, t.v1, t.v2}) mesh.positions.push_back(vec(v));
+    mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+  }
+  const glm::vec3 lo = grid.corner(cell.at);
+  const Box box = {lo - grid.margin, lo + grid.size + grid.margin};
+  BvhOptions options;
+  options.within = &box;
+  options.split_budget =
+      std::min(options.split_budget, double(LSP_CELL_MAX_REFERENCES - 1) / double(cell.count) - 1);
+  options.heuristic_depth = LSP_MAX_CELL_DEPTH - uint32_t(std::bit_width(LSP_CELL_MAX_REFERENCES));
+  return build_bvh(mesh, options);
+}
+
 class Filler {
  public:
   Filler(const CellScene& scene, uint32_t cell)
@@ -140,25 +157,14 @@ class Filler {
   }
 
  private:
-  // A tree of the cell's own triangles, numbered from 0.
+  // The cell's own tree, to trace its near rays in, and as the file has it.
   void build_tree() {
     Mesh mesh;
+    Bvh bvh = tree_of(scene_.grid, scene_.triangles, cell_, mesh);
     for (uint32_t i = 0; i < cell_.count; ++i) {
-      const LspTriangle& t = scene_.triangles[records_[i]];
       bounds_.emplace_back();
-      for (const lsp_float3& v : {t.v0, t.v1, t.v2}) {
-        mesh.positions.push_back(vec(v));
-        bounds_.back().grow(vec(v));
-      }
-      mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+      for (uint32_t k = 0; k < 3; ++k) bounds_.back().grow(mesh.positions[3 * i + k]);
     }
-    const Box box = {lo_ - scene_.grid.margin, lo_ + size_ + scene_.grid.margin};
-    BvhOptions options;
-    options.within = &box;
-    options.split_budget =
-        std::min(options.split_budget, double(LSP_CELL_MAX_REFERENCES - 1) / double(cell_.count) - 1);
-    options.heuristic_depth = LSP_MAX_CELL_DEPTH - uint32_t(std::bit_width(LSP_CELL_MAX_REFERENCES));
-    Bvh bvh = build_bvh(mesh, options);
     out_.tree = compact(bvh, lo_ - scene_.grid.margin, size_ + 2 * scene_.grid.margin);
     tree_ = build_wide_tree(mesh, bvh);
     for (uint32_t& r : out_.tree.references) r = records_[r];
@@ -446,5 +452,20 @@ class Filler {
 }  // namespace
 
 FilledCell fill_cell(const CellScene& scene, uint32_t cell) { return Filler(scene, cell).run(); }
+
+double tests_of_ray(const CellGrid& grid, std::span<const LspTriangle> triangles, uint32_t cell) {
+  Mesh mesh;
+  const Bvh bvh = tree_of(grid, triangles, grid.cells[cell], mesh);
+  const auto triangles_of = [](uint32_t child) {
+    return child & LSP_LEAF_BIT ? double((child >> LSP_LEAF_COUNT_SHIFT & LSP_LEAF_COUNT_MASK) + 1) : 0;
+  };
+  const double all = Box{glm::vec3(0), glm::vec3(grid.size)}.half_area();
+  double tests = triangles_of(bvh.root);
+  for (const LspNode& n : bvh.nodes)
+    tests += (Box{vec(n.lo0), vec(n.hi0)}.half_area() * (1 + triangles_of(n.child0)) +
+              Box{vec(n.lo1), vec(n.hi1)}.half_area() * (1 + triangles_of(n.child1))) /
+             all;
+  return tests;
+}
 
 }  // namespace lsp

@@ -30,4 +30,8 @@ struct FilledCell {
 };
 FilledCell fill_cell(const CellScene& scene, uint32_t cell);
 
+// Boxes and triangles that a ray through a cell tests in the cell's own tree, on average: what filling it
+// costs grows with them.
+double tests_of_ray(const CellGrid& grid, std::span<const LspTriangle> triangles, uint32_t cell);
+
 }  // namespace lsp

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <string>
 
+#include "../bake.h"
 #include "../vectors.h"
 #include "lsp/program.h"
 #include "triangle_box.h"
@@ -25,23 +26,37 @@ struct Reference {
   uint32_t cell, record;
 };
 
-// The cells that a triangle reaches into.
-void add_references(const CellGrid& grid, const LspTriangle& triangle, uint32_t record,
-                    std::vector<Reference>& out) {
+// Cells from `first` to `last`, in each direction.
+struct CellRange {
+  glm::ivec3 first, last;
+};
+
+// Those that the box of a triangle reaches into, or might.
+CellRange cells_about(const CellGrid& grid, const LspTriangle& triangle) {
   Box box;
   for (const lsp_float3& v : {triangle.v0, triangle.v1, triangle.v2}) box.grow(vec(v));
   const auto cell_of = [&](const glm::vec3& p) {
     return glm::clamp(glm::ivec3(glm::floor((p - grid.lo) / grid.size)), glm::ivec3(0), grid.dims - 1);
   };
-  const glm::ivec3 first = cell_of(box.lo - 2 * grid.margin), last = cell_of(box.hi + 2 * grid.margin);
+  return {cell_of(box.lo - 2 * grid.margin), cell_of(box.hi + 2 * grid.margin)};
+}
+
+// Whether a triangle comes within the margin of the box of these cells.
+bool reaches(const CellGrid& grid, const LspTriangle& triangle, const CellRange& cells) {
+  return reaches_into(triangle, glm::dvec3(grid.corner(cells.first)) - double(grid.margin),
+                      glm::dvec3(grid.corner(cells.last + 1)) + double(grid.margin));
+}
+
+// The cells that a triangle reaches into.
+void add_references(const CellGrid& grid, const LspTriangle& triangle, uint32_t record,
+                    std::vector<Reference>& out) {
+  const auto [first, last] = cells_about(grid, triangle);
   glm::ivec3 c;
   for (c.z = first.z; c.z <= last.z; ++c.z)
     for (c.y = first.y; c.y <= last.y; ++c.y)
-      for (c.x = first.x; c.x <= last.x; ++c.x) {
-        const glm::dvec3 lo = glm::dvec3(grid.corner(c)) - double(grid.margin);
-        const glm::dvec3 hi = glm::dvec3(grid.corner(c + 1)) + double(grid.margin);
-        if (first == last || reaches_into(triangle, lo, hi)) out.push_back({uint32_t(grid.index(c)), record});
-      }
+      for (c.x = first.x; c.x <= last.x; ++c.x)
+        if (first == last || reaches(grid, triangle, {c, c}))
+          out.push_back({uint32_t(grid.index(c)), record});
 }
 
 // How far every empty cell is from the nearest filled one, in cells along the longest axis: a box blur of the
@@ -75,8 +90,8 @@ void add_jumps(CellGrid& grid) {
   }
 }
 
-// The grid but for its jumps.
-CellGrid sort_into_cells(std::span<const LspTriangle> triangles, const Box& bounds, uint32_t longest) {
+// A grid of which it is not known what lies in its cells.
+CellGrid lay_out(const Box& bounds, uint32_t longest) {
   CellGrid grid;
   const glm::vec3 extent = bounds.extent();
   const float side = std::max({extent.x, extent.y, extent.z});
@@ -88,8 +103,17 @@ CellGrid sort_into_cells(std::span<const LspTriangle> triangles, const Box& boun
   for (int k = 0; k < 3; ++k)
     grid.dims[k] = std::clamp(int(std::ceil((extent[k] + 2 * pad) / grid.size - 1e-4f)), 1, int(longest));
   grid.margin = grid.size * kMargin + rounding;
-  grid.words.assign(size_t(grid.dims.x) * size_t(grid.dims.y) * size_t(grid.dims.z), LSP_CELL_MAX_JUMP);
+  return grid;
+}
 
+size_t cells_of(const CellGrid& grid) {
+  return size_t(grid.dims.x) * size_t(grid.dims.y) * size_t(grid.dims.z);
+}
+
+// The grid but for its jumps.
+CellGrid sort_into_cells(std::span<const LspTriangle> triangles, const Box& bounds, uint32_t longest) {
+  CellGrid grid = lay_out(bounds, longest);
+  grid.words.assign(cells_of(grid), LSP_CELL_MAX_JUMP);
   std::vector<std::vector<Reference>> parts((triangles.size() + kPart - 1) / kPart);
   tbb::parallel_for(size_t(0), parts.size(), [&](size_t p) {
     for (size_t i = p * kPart; i < std::min(triangles.size(), (p + 1) * kPart); ++i)
@@ -139,20 +163,90 @@ size_t fullest(const CellGrid& grid) {
   return most;
 }
 
-CellGrid finish(CellGrid grid) {
-  const size_t most = fullest(grid);
-  if (most > kMostInCell)
+// How full a grid's cells would be, without the grid: its fullest part is halved again and again, and only
+// what holds too much for a cell is looked into.
+class Crowd {
+ public:
+  Crowd(std::span<const LspTriangle> triangles, const Box& bounds) : triangles_(triangles), bounds_(bounds) {
+    std::vector<bool> seen;
+    for (uint32_t i = 0; i < triangles.size(); ++i) {
+      const uint32_t primitive = triangles[i].primitive;
+      if (primitive >= seen.size()) seen.resize(primitive + 1);
+      if (!seen[primitive]) all_.push_back(i);  // those that spatial splits repeat count once
+      seen[primitive] = true;
+    }
+  }
+
+  // The triangles of a cell that cannot hold them, 0 where there is none.
+  size_t in_cell_of(uint32_t longest) const {
+    const CellGrid grid = lay_out(bounds_, longest);
+    return all_.size() > kMostInCell ? in(grid, {glm::ivec3(0), grid.dims - 1}, all_) : 0;
+  }
+
+ private:
+  size_t in(const CellGrid& grid, const CellRange& cells, const std::vector<uint32_t>& records) const {
+    const glm::ivec3 longer = cells.last - cells.first;
+    const int axis = longer.x >= longer.y ? (longer.x >= longer.z ? 0 : 2) : (longer.y >= longer.z ? 1 : 2);
+    if (longer[axis] == 0) return records.size();
+    CellRange halves[2] = {cells, cells};
+    halves[0].last[axis] = cells.first[axis] + longer[axis] / 2;
+    halves[1].first[axis] = halves[0].last[axis] + 1;
+    std::vector<uint32_t> held[2];
+    for (const uint32_t record : records) {
+      const CellRange about = cells_about(grid, triangles_[record]);
+      for (size_t h = 0; h < 2; ++h)
+        if (about.first[axis] <= halves[h].last[axis] && about.last[axis] >= halves[h].first[axis] &&
+            (about.first == about.last || reaches(grid, triangles_[record], halves[h])))
+          held[h].push_back(record);
+    }
+    const size_t fuller = held[0].size() < held[1].size() ? 1 : 0;
+    for (const size_t h : {fuller, 1 - fuller}) {
+      if (held[h].size() <= kMostInCell) return 0;
+      if (const size_t most = in(grid, halves[h], held[h])) return most;
+    }
+    return 0;
+  }
+
+  std::span<const LspTriangle> triangles_;
+  const Box& bounds_;
+  std::vector<uint32_t> all_;
+};
+
+// The most cells along the longest side of a grid of about kMostCells.
+uint32_t finest(const Box& bounds) {
+  uint32_t longest = LSP_MAX_CELLS;
+  while (longest > 1 && cells_of(lay_out(bounds, longest)) > kMostCells) --longest;
+  return longest;
+}
+
+// Few more cells on the longest side than the fewest of which none is too full. Throws where not even the
+// finest grid will do.
+uint32_t refine(const Crowd& crowd, uint32_t too_full, uint32_t fine) {
+  if (const size_t most = crowd.in_cell_of(fine))
     throw Failure(Exit::kLimit, "",
-                  "a cell would hold " + std::to_string(most) + " triangles, and it can hold " +
-                      std::to_string(kMostInCell) + ": give more --cells, or --base bvh");
-  add_jumps(grid);
-  return grid;
+                  "a cell of the finest grid would hold " + with_commas(most) +
+                      " triangles, and it can hold " + with_commas(kMostInCell) +
+                      ": give --base wide for exact rays alone, or --base bvh for tables of another kind");
+  while (fine > too_full + too_full / 16 + 1) {
+    const uint32_t between = std::max(too_full + 1, uint32_t(std::sqrt(double(too_full) * double(fine))));
+    (crowd.in_cell_of(between) ? too_full : fine) = between;
+  }
+  return fine;
 }
 
 }  // namespace
 
 CellGrid build_cell_grid(std::span<const LspTriangle> triangles, const Box& bounds, uint32_t longest) {
-  return finish(sort_into_cells(triangles, bounds, longest));
+  CellGrid grid = sort_into_cells(triangles, bounds, longest);
+  if (const size_t most = fullest(grid); most > kMostInCell) {
+    const uint32_t enough = refine(Crowd(triangles, bounds), longest, std::max(longest, finest(bounds)));
+    throw Failure(Exit::kLimit, "",
+                  "a cell would hold " + with_commas(most) + " triangles, and it can hold " +
+                      with_commas(kMostInCell) + ": give --cells " + std::to_string(enough) +
+                      " or more, or --base bvh");
+  }
+  add_jumps(grid);
+  return grid;
 }
 
 CellGrid choose_cell_grid(std::span<const LspTriangle> triangles, const Box& bounds, size_t most) {
@@ -169,12 +263,13 @@ CellGrid choose_cell_grid(std::span<const LspTriangle> triangles, const Box& bou
     longest = next;
     grid = sort_into_cells(triangles, bounds, longest);
   }
-  while (longest < LSP_MAX_CELLS && grid.words.size() < kMostCells && fullest(grid) > kMostInCell) {
-    longest = std::min(longest + longest / 16 + 1, LSP_MAX_CELLS);
-    grid = sort_into_cells(triangles, bounds, longest);
-    grid.crowded = true;
+  if (fullest(grid) <= kMostInCell) {
+    add_jumps(grid);
+    return grid;
   }
-  return finish(std::move(grid));
+  grid = build_cell_grid(triangles, bounds, refine(Crowd(triangles, bounds), longest, finest(bounds)));
+  grid.crowded = true;
+  return grid;
 }
 
 }  // namespace lsp

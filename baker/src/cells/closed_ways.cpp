@@ -16,9 +16,10 @@ namespace {
 constexpr uint32_t kPerWay = 16;      // rays of each way that are asked for, on average
 constexpr uint32_t kEyes = 1u << 14;  // that look at once
 constexpr uint32_t kMostEyes = 1u << 22;
-constexpr uint32_t kPerPoint = 4;  // rays from what each sees
-constexpr size_t kPart = 1024;     // traced at once
-constexpr float kOffset = 1e-4f;   // of the diagonal, of a ray's beginning from the surface
+constexpr uint32_t kEyesForRay = 32;  // at most, for a ray that is wanted: of needles hardly an eye sees one
+constexpr uint32_t kPerPoint = 4;     // rays from what each sees
+constexpr size_t kPart = 1024;        // traced at once
+constexpr float kOffset = 1e-4f;      // of the diagonal, of a ray's beginning from the surface
 constexpr uint64_t kSeed = uint64_t{1} << 42;
 
 // A way by which less than one ray in so many leaves the scene is closed.
@@ -146,8 +147,8 @@ void find_closed_ways(Baked& baked) {
   Ways ways(baked);
   const uint64_t wanted = uint64_t{kPerWay} * LSP_WAYS * baked.cell_tables.cells.size();
   uint64_t rays = 0;
-  for (uint32_t first = 0; first < kMostEyes && rays < wanted; first += kEyes)
-    rays += ways.look(first, kEyes);
+  const auto eyes = uint32_t(std::min<uint64_t>(kMostEyes, kEyesForRay * wanted));
+  for (uint32_t first = 0; first < eyes && rays < wanted; first += kEyes) rays += ways.look(first, kEyes);
   for (size_t i = 0; i < baked.cell_tables.cells.size(); ++i)
     baked.cell_tables.cells[i].closed = ways.closed(i);
 }
