@@ -227,6 +227,13 @@ uint32_t refine(const Crowd& crowd, uint32_t too_full, uint32_t fine) {
                   "a cell of the finest grid would hold " + with_commas(most) +
                       " triangles, and it can hold " + with_commas(kMostInCell) +
                       ": give --base wide for exact rays alone, or --base bvh for tables of another kind");
+  // Often a little finer will do, which halving may pass by: the fullest cell of a finer grid can be fuller.
+  for (int k = 0; k < 4; ++k) {
+    const uint32_t next = too_full + too_full / 16 + 1;
+    if (next >= fine) return fine;
+    if (!crowd.in_cell_of(next)) return next;
+    too_full = next;
+  }
   while (fine > too_full + too_full / 16 + 1) {
     const uint32_t between = std::max(too_full + 1, uint32_t(std::sqrt(double(too_full) * double(fine))));
     (crowd.in_cell_of(between) ? too_full : fine) = between;
