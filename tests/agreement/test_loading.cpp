@@ -333,10 +333,13 @@ TEST(Loading, TheCpuReadsTheSameSections) {
       const std::vector<LspHit> truth = trace(scene, options, rays);
       const Names names = sections_for(scene, kinds | occlusion);
       const Unreadable others(scene, names);
-      EXPECT_EQ(differing(trace(scene, options, rays), truth, false), 0u);
+      lsp_scene read = scene;
+      // Or closest rays may go through the cells' trees.
+      if (kinds == LSP_USE_EXACT) read.cell_references = nullptr;
+      EXPECT_EQ(differing(trace(read, options, rays), truth, false), 0u);
       lsp_trace_counts counts{};  // counted rays go one after the other
       LspHit hit;
-      EXPECT_EQ(lsp_trace(&scene, &options, rays.data(), &hit, 1, &counts, nullptr), LSP_OK);
+      EXPECT_EQ(lsp_trace(&read, &options, rays.data(), &hit, 1, &counts, nullptr), LSP_OK);
     }
 }
 
