@@ -119,6 +119,9 @@ TEST_F(Off, Refusals) {
   EXPECT_EQ(refusal("a.off", "OFF\n1 1 0\n0 0 0\n2000000000 0 0 0\n").exit, Exit::kInvalid);
   EXPECT_EQ(refusal("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n").exit, Exit::kInvalid);
   EXPECT_EQ(refusal("a.off", "solid\n").exit, Exit::kInvalid);
+  const Refusal crowded = refusal("a.off", "OFF\n3 1 0\n0 0 0 1 0 0 0 1 0\n3 0 1 2\n");
+  EXPECT_NE(crowded.message.find("give each vertex a line of its own"), crowded.message.npos)
+      << crowded.message;
 }
 
 }  // namespace

@@ -96,7 +96,11 @@ class OffReader {
   std::string_view word() {
     std::string_view word;
     if (!words_.next(word))
-      throw Failure(Exit::kInvalid, file_, "ends too early, it is cut short: export or copy it again");
+      throw Failure(Exit::kInvalid, file_,
+                    vertex_values_left_
+                        ? "ends too early, and lines hold more than a vertex: give each vertex a "
+                          "line of its own, or export it again"
+                        : "ends too early, it is cut short: export or copy it again");
     return word;
   }
 
