@@ -41,7 +41,7 @@ namespace HWY_NAMESPACE {
 namespace {
 
 // How far from the grid exact rays may begin, in the sum of its sides.
-constexpr float kReach = 2;
+constexpr float kFarthestOrigin = 2;
 
 // A ray's doubt_: a miss of it is a mistake, and it was one (LspWalk.closed, .again).
 constexpr uint32_t kClosed = 1, kAgain = 2;
@@ -159,7 +159,7 @@ struct Tracer : Rays<kPool> {
     store(hn::Zero(du), step_ + i);
     store(hn::Zero(du), doubt_ + i);
     // Beyond, the margin of cells does not make up for what is rounded.
-    const VF reach = set(kReach * static_cast<float>(grid.cells_x + grid.cells_y + grid.cells_z));
+    const VF reach = set(kFarthestOrigin * static_cast<float>(grid.cells_x + grid.cells_y + grid.cells_z));
     begin(i, first, last, tables ? valid : hn::And(valid, hn::Lt(largest(load_3(origin_, i)), reach)));
   }
 

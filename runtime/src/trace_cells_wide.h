@@ -27,7 +27,7 @@ const WideCells* wide_cells(const lsp_scene& scene);
 // So few exact rays are faster through the tree.
 constexpr uint64_t kFewExactRays = 128;
 
-// The same for exact closest rays, where it is faster than the tree: with sixteen lanes (1.2x to 1.45x in
+// The same for exact closest rays, where it is faster than the tree: with sixteen lanes (1.2x to 1.4x in
 // halls, with eight 0.9x to 1.0x). Null: the tree is.
 const WideCells* wide_cells_for_exact_rays(const lsp_scene& scene);
 
