@@ -236,6 +236,10 @@ extern "C" lsp_status lsp_vulkan_plan_trace(const lsp_scene* scene, const lsp_vu
   return lsp::succeed(error);
 }
 
+extern "C" int lsp_vulkan_has_passes(const lsp_vulkan_kind* kind) {
+  return kind->base_structure == LSP_BASE_CELLS && (kind->parts & LSP_PART_CELL_EXACT) != 0 ? 1 : 0;
+}
+
 // What kind of trace options ask for of an asset, by the shader of instances.
 static lsp_status plan_asset(const lsp_scene* asset, const lsp_vulkan_plan* plan,
                              const lsp_trace_options* options, lsp_vulkan_kind* kind, lsp_error* error) {

@@ -52,7 +52,7 @@ void RayBatches::reserve(size_t rays) {
   const auto count = static_cast<uint32_t>(std::min<size_t>(rays, most()));
   if (count <= capacity_) return;
   capacity_ = 0;
-  for (Buffer* buffer : {&rays_, &hits_, &device_rays_, &device_hits_})
+  for (Buffer* buffer : {&rays_, &hits_, &device_rays_, &device_hits_, &queue_})
     *buffer = {};  // before the new ones are made, not after
   const VkDeviceSize bytes = VkDeviceSize{count} * sizeof(LspRay);
   constexpr VkBufferUsageFlags kStorage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
@@ -65,6 +65,12 @@ void RayBatches::reserve(size_t rays) {
     device_hits_ = Buffer(device_, bytes, kStorage | kFrom, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT, 0);
   }
   capacity_ = count;
+}
+
+void RayBatches::reserve_queue() {
+  if (queue_.handle() != VK_NULL_HANDLE) return;
+  queue_ = Buffer(device_, lsp_vulkan_queue_bytes(capacity_), LSP_VULKAN_QUEUE_USAGE,
+                  VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT, 0);
 }
 
 void RayBatches::write_timestamp(VkCommandBuffer commands, uint32_t number) {

@@ -27,6 +27,10 @@ class RayBatches {
   VkBuffer rays() const { return staged() ? device_rays_.handle() : rays_.handle(); }
   VkBuffer hits() const { return staged() ? device_hits_.handle() : hits_.handle(); }
   VkBuffer counters() const { return counters_.handle(); }
+  // Where rays wait for a pass; after the first call of reserve_queue.
+  VkBuffer queue() const { return queue_.handle(); }
+  // Makes room for as many rays to wait as there is room for.
+  void reserve_queue();
 
   // Traces rays into hits, of the same size, once there is room; seconds are left to the caller.
   VulkanTrace trace(const Record& record, const Retrace& retrace, std::span<const LspRay> rays,
@@ -49,6 +53,7 @@ class RayBatches {
   Buffer rays_, hits_;
   Buffer device_rays_, device_hits_;  // discrete devices only
   Buffer counters_;                   // lsp_trace_counts
+  Buffer queue_;                      // lsp_vulkan_record_passes
   Commands commands_;                 // ends, and with it what it does, before the buffers
 };
 

@@ -34,16 +34,42 @@ void write_bindings(const lsp_vulkan_functions& functions, VkDevice device, VkDe
   for (uint32_t i = 0; i < LSP_BINDING_COUNT; ++i) write_binding(functions, device, set, i, bound[i]);
 }
 
-// One invocation a ray.
-void record_dispatch(const lsp_vulkan_functions& functions, VkCommandBuffer commands, VkPipeline pipeline,
-                     VkPipelineLayout layout, VkDescriptorSet set, const void* constants, uint32_t bytes,
-                     uint32_t count) {
+void bind(const lsp_vulkan_functions& functions, VkCommandBuffer commands, VkPipeline pipeline,
+          VkPipelineLayout layout, VkDescriptorSet set, const void* constants, uint32_t bytes) {
   functions.cmd_bind_pipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline);
   functions.cmd_bind_descriptor_sets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, layout, 0, 1, &set, 0,
                                      nullptr);
   functions.cmd_push_constants(commands, layout, VK_SHADER_STAGE_COMPUTE_BIT, 0, bytes, constants);
+}
+
+// One invocation a ray.
+void record_dispatch(const lsp_vulkan_functions& functions, VkCommandBuffer commands, VkPipeline pipeline,
+                     VkPipelineLayout layout, VkDescriptorSet set, const void* constants, uint32_t bytes,
+                     uint32_t count) {
+  bind(functions, commands, pipeline, layout, set, constants, bytes);
   functions.cmd_dispatch(commands, (count + LSP_VULKAN_GROUP_SIZE - 1) / LSP_VULKAN_GROUP_SIZE, 1, 1);
 }
+
+// What a pass or a transfer has written is there for the next pass.
+void record_pass_barrier(const lsp_vulkan_functions& functions, VkCommandBuffer commands) {
+  VkMemoryBarrier barrier{};
+  barrier.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;
+  barrier.srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_WRITE_BIT;
+  barrier.dstAccessMask =
+      VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_INDIRECT_COMMAND_READ_BIT;
+  functions.cmd_pipeline_barrier(commands,
+                                 VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT,
+                                 VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_DRAW_INDIRECT_BIT,
+                                 0, 1, &barrier, 0, nullptr, 0, nullptr);
+}
+
+// Nobody waits for a pass yet.
+void record_queue_head(const lsp_vulkan_functions& functions, VkCommandBuffer commands, VkBuffer queue) {
+  uint32_t head[LSP_VULKAN_QUEUE_HEAD]{};
+  for (uint32_t pass = 0; pass <= LSP_VULKAN_LAST; ++pass) head[4 * pass + 2] = head[4 * pass + 3] = 1;
+  functions.cmd_update_buffer(commands, queue, 0, sizeof head, head);
+}
+static_assert(LSP_VULKAN_QUEUE_HEAD == 4 * (LSP_VULKAN_LAST + 1));
 
 }  // namespace
 
@@ -56,6 +82,8 @@ extern "C" lsp_status lsp_vulkan_load_functions(VkDevice device, PFN_vkGetDevice
                    load(device, get, "vkCmdBindDescriptorSets", &functions->cmd_bind_descriptor_sets) &&
                    load(device, get, "vkCmdPushConstants", &functions->cmd_push_constants) &&
                    load(device, get, "vkCmdDispatch", &functions->cmd_dispatch) &&
+                   load(device, get, "vkCmdDispatchIndirect", &functions->cmd_dispatch_indirect) &&
+                   load(device, get, "vkCmdUpdateBuffer", &functions->cmd_update_buffer) &&
                    load(device, get, "vkUpdateDescriptorSets", &functions->update_descriptor_sets);
   if (!all) return lsp::fail(error, LSP_ERROR_UNSUPPORTED, 0, "the device lacks a function of Vulkan 1.0");
   return lsp::succeed(error);
@@ -137,6 +165,32 @@ extern "C" void lsp_vulkan_record_trace(const lsp_vulkan_functions* functions, V
                                         const lsp_vulkan_trace_constants* constants) {
   record_dispatch(*functions, commands, pipeline, layout, set, constants, sizeof *constants,
                   constants->count);
+}
+
+extern "C" VkDeviceSize lsp_vulkan_queue_bytes(uint32_t rays) {
+  return (LSP_VULKAN_QUEUE_HEAD + 2 * VkDeviceSize{rays}) * sizeof(uint32_t);
+}
+
+extern "C" void lsp_vulkan_write_queue(const lsp_vulkan_functions* functions, VkDevice device,
+                                       VkDescriptorSet set, VkBuffer queue) {
+  write_binding(*functions, device, set, LSP_BINDING_QUEUE, queue);
+}
+
+extern "C" void lsp_vulkan_record_passes(const lsp_vulkan_functions* functions, VkCommandBuffer commands,
+                                         const VkPipeline* pipelines, VkPipelineLayout layout,
+                                         VkDescriptorSet set, VkBuffer queue,
+                                         const lsp_vulkan_trace_constants* constants) {
+  record_queue_head(*functions, commands, queue);
+  record_pass_barrier(*functions, commands);
+  lsp_vulkan_pass_constants pass{0, constants->first, constants->count, constants->dial};
+  record_dispatch(*functions, commands, pipelines[LSP_VULKAN_FIRST_PASS], layout, set, &pass, sizeof pass,
+                  pass.count);
+  for (pass.pass = 1; pass.pass <= LSP_VULKAN_LAST; ++pass.pass) {
+    record_pass_barrier(*functions, commands);
+    const uint32_t kind = pass.pass < LSP_VULKAN_LAST ? LSP_VULKAN_CALL_PASS : LSP_VULKAN_LAST_PASS;
+    bind(*functions, commands, pipelines[kind], layout, set, &pass, sizeof pass);
+    functions->cmd_dispatch_indirect(commands, queue, (4 * VkDeviceSize{pass.pass} + 1) * sizeof(uint32_t));
+  }
 }
 
 extern "C" void lsp_vulkan_record_instances(const lsp_vulkan_functions* functions, VkCommandBuffer commands,

@@ -13,9 +13,7 @@
 
 layout(local_size_x = LSP_VULKAN_GROUP_SIZE) in;
 
-// As words: 16-byte loads and stores are faster than member by member, and keep every bit.
-layout(std430, set = 0, binding = LSP_BINDING_RAYS) readonly buffer RayBuffer { uvec4 ray_words[]; };
-layout(std430, set = 0, binding = LSP_BINDING_HITS) writeonly buffer HitBuffer { uvec4 hit_words[]; };
+#include "rays.glsl"
 
 // The kind of trace is part of the pipeline: what it does not need (look-ups in an exact trace) is compiled
 // away, which matters most where a device runs both sides of every branch.
@@ -41,9 +39,7 @@ void add(uint field, uint n) {
 void main() {
   if (gl_GlobalInvocationID.x >= constants.count) return;
   uint index = constants.first + gl_GlobalInvocationID.x;
-  uvec4 a = ray_words[2u * index];
-  uvec4 b = ray_words[2u * index + 1u];
-  LspRay ray = LspRay(uintBitsToFloat(a.xyz), uintBitsToFloat(a.w), uintBitsToFloat(b.xyz), uintBitsToFloat(b.w));
+  LspRay ray = load_ray(index);
 
 #ifdef LSP_INSTANCES
   LspTraced traced = lsp_trace_ray_instances(constants.instance_count, ray, constants.mask, kFlags);
@@ -63,8 +59,5 @@ void main() {
     add(LSP_COUNTER_EXACT_NODES, traced.counts.exact_nodes);
   }
 #endif
-
-  hit_words[2u * index] =
-      uvec4(floatBitsToUint(hit.t), hit.primitive, floatBitsToUint(hit.u), floatBitsToUint(hit.v));
-  hit_words[2u * index + 1u] = uvec4(floatBitsToUint(hit.normal), hit.flags);
+  store_hit(index, hit);
 }

@@ -64,8 +64,9 @@ VkPipeline TraceShader::create_pipeline(const uint32_t* words, size_t bytes, con
   const VkSpecializationMapEntry entries[] = {
       {LSP_VULKAN_STACK_CONSTANT, offsetof(lsp_vulkan_kind, stack), sizeof(uint32_t)},
       {LSP_VULKAN_FLAGS_CONSTANT, offsetof(lsp_vulkan_kind, flags), sizeof(uint32_t)},
-      {LSP_VULKAN_PARTS_CONSTANT, offsetof(lsp_vulkan_kind, parts), sizeof(uint32_t)}};
-  const VkSpecializationInfo specialization{3, entries, sizeof kind, &kind};
+      {LSP_VULKAN_PARTS_CONSTANT, offsetof(lsp_vulkan_kind, parts), sizeof(uint32_t)},
+      {LSP_VULKAN_PASS_CONSTANT, offsetof(lsp_vulkan_kind, pass), sizeof(uint32_t)}};
+  const VkSpecializationInfo specialization{4, entries, sizeof kind, &kind};
   auto info = vk_make<VkComputePipelineCreateInfo>(VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO);
   info.stage = vk_make<VkPipelineShaderStageCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO);
   info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;

@@ -51,6 +51,14 @@ class Pipelines {
     const uint32_t* words = lsp_vulkan_trace_spirv(&plan, counting ? 1 : 0, &bytes);
     return pipeline = create(words, bytes, kind);
   }
+  // The same of a pass, by kind.pass; it does not count.
+  VkPipeline get_pass(const lsp_vulkan_kind& kind) {
+    VkPipeline& pipeline = made_[{kPasses + kind.pass, kind.addresses, false, kind.flags, kind.parts}];
+    if (pipeline != VK_NULL_HANDLE) return pipeline;
+    size_t bytes = 0;
+    const uint32_t* words = lsp_vulkan_passes_spirv(&kind, &bytes);
+    return pipeline = create(words, bytes, kind);
+  }
   // The same of instances, whose assets need these parts of the shader.
   VkPipeline get_instances(bool counting, const lsp_vulkan_kind& kind) {
     VkPipeline& pipeline = made_[{kInstances, kind.addresses, counting, kind.flags, kind.parts}];
@@ -61,7 +69,9 @@ class Pipelines {
   }
 
  private:
-  static constexpr uint32_t kInstances = 0;  // no base structure's number
+  // No base structures' numbers.
+  static constexpr uint32_t kInstances = 0;
+  static constexpr uint32_t kPasses = 100;
 
   VkPipeline create(const uint32_t* words, size_t bytes, lsp_vulkan_kind kind) {
     kind.stack = stack_;
@@ -347,16 +357,32 @@ VulkanTrace VulkanTracer::Impl::trace(const lsp_trace_options& options, std::spa
   if (scene.buffers.plan().addresses != 0) {
     lsp_vulkan_write_address_table(&device->functions, device->handle, set_, scene.buffers.addresses());
   }
-  const VkPipeline pipeline = pipelines_->get(scene.buffers.plan(), count, kind);
+  const bool passes = !count && rays.size() >= options_.passes_from && lsp_vulkan_has_passes(&kind) != 0;
+  VkPipeline pipelines[LSP_VULKAN_PASS_KINDS]{};
+  if (passes) {
+    batches_->reserve_queue();
+    lsp_vulkan_write_queue(&device->functions, device->handle, set_, batches_->queue());
+    for (kind.pass = 0; kind.pass < LSP_VULKAN_PASS_KINDS; ++kind.pass)
+      pipelines[kind.pass] = pipelines_->get_pass(kind);
+  } else {
+    pipelines[0] = pipelines_->get(scene.buffers.plan(), count, kind);
+  }
   const auto record = [&](VkCommandBuffer commands, uint32_t size) {
     const lsp_vulkan_trace_constants constants{options.lod, 0, size, kind.dial};
-    lsp_vulkan_record_trace(&device->functions, commands, pipeline, shader_->layout(), set_, &constants);
+    if (passes) {
+      lsp_vulkan_record_passes(&device->functions, commands, pipelines, shader_->layout(), set_,
+                               batches_->queue(), &constants);
+    } else {
+      lsp_vulkan_record_trace(&device->functions, commands, pipelines[0], shader_->layout(), set_,
+                              &constants);
+    }
   };
   const lsp_trace_options again = as_loaded(options);
   const auto retrace = [&](const LspRay& ray, LspHit& hit, lsp_trace_counts* counts, lsp_error* error) {
     return lsp_trace(&scene.scene, &again, &ray, &hit, 1, counts, error);
   };
   VulkanTrace result = batches_->trace(record, retrace, rays, hits, count);
+  result.passes = passes;
   result.seconds = seconds_since(start);
   return result;
 }

@@ -411,11 +411,17 @@ TEST_P(CellsOnVulkan, SameBits) {
       const auto cpu = trace(file.scene(), options, rays, &counts);
       const VulkanTrace traced = tracer.trace(options, rays, gpu, true);
       EXPECT_TRUE(same_bits(cpu, gpu)) << options.flags << " " << options.max_loss;
+      EXPECT_FALSE(traced.passes);
       EXPECT_EQ(traced.counts.nodes, counts.nodes);
       EXPECT_EQ(traced.counts.shafts, counts.shafts);
       EXPECT_EQ(traced.counts.splits, counts.splits);
       EXPECT_EQ(traced.counts.exact, counts.exact);
       EXPECT_EQ(traced.counts.triangles, counts.triangles);
+      const bool exactly = (options.flags & LSP_TRACE_APPROXIMATE) != 0 && counts.exact > 0;
+      const VulkanTrace in_passes = tracer.trace(options, rays, gpu);
+      EXPECT_TRUE(same_bits(cpu, gpu)) << options.flags << " " << options.max_loss;
+      EXPECT_EQ(in_passes.passes, exactly);
+      EXPECT_EQ(in_passes.retraced, 0u);
       if ((options.flags & LSP_TRACE_ANY_HIT) == 0) continue;
       lsp_trace_options occlusion = options;
       occlusion.flags = (options.flags & ~LSP_TRACE_ANY_HIT) | LSP_TRACE_OCCLUSION;
@@ -429,6 +435,42 @@ TEST_P(CellsOnVulkan, SameBits) {
   }
   fs::remove(path);
 }
+// Rays that wait in a list for the next pass: of any number, in batches on a discrete device, with nothing
+// for the validation layer to say, more often than there are passes (every cell exactly).
+TEST(CellsInPasses, AnyNumberOfRays) {
+  std::string why;
+  if (!VulkanTracer::available(&why)) GTEST_SKIP() << why;
+  const std::string path =
+      (fs::temp_directory_path() / ("lsp_test_passes_" + std::to_string(getpid()) + ".lsp")).string();
+  lsp::Baked& baked = baked_room();
+  write_lsp(path, baked, "{}", {});
+  {
+    const SceneFile file(path);
+    std::vector<LspRay> all = surface_rays(baked, 700, 1);
+    const std::vector<LspRay> hard = hard_rays(baked.triangles, 300, 3);  // some of them invalid
+    all.insert(all.end(), hard.begin(), hard.end());
+    for (const bool discrete : {false, true}) {
+      VulkanOptions options;
+      options.discrete = discrete;
+      options.passes_from = 1;
+      options.validation = true;
+      VulkanTracer tracer(options);
+      tracer.load(file.scene(), LSP_USE_APPROXIMATE);
+      for (const float loss : {0.0f, 5.0f}) {
+        for (const size_t count : {size_t{1}, size_t{63}, size_t{64}, size_t{65}, all.size(), size_t{7}}) {
+          const std::vector<LspRay> rays(all.end() - static_cast<std::ptrdiff_t>(count), all.end());
+          const lsp_trace_options asked = tables_but(loss, 0);
+          std::vector<LspHit> gpu(count);
+          EXPECT_TRUE(tracer.trace(asked, rays, gpu).passes);
+          EXPECT_TRUE(same_bits(trace(file.scene(), asked, rays), gpu)) << count << " rays, " << loss;
+        }
+      }
+      for (const std::string& message : tracer.validation_messages()) ADD_FAILURE() << message;
+    }
+  }
+  fs::remove(path);
+}
+
 INSTANTIATE_TEST_SUITE_P(Loads, CellsOnVulkan, testing::Values(0u, LSP_USE_ADDRESSES_ALWAYS));
 
 }  // namespace

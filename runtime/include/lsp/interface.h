@@ -95,8 +95,9 @@ LSP_END(LspHit)
 #define LSP_BINDING_RAYS 12     /* LspRay, read */
 #define LSP_BINDING_HITS 13     /* LspHit, written */
 #define LSP_BINDING_COUNTERS 14 /* lsp_trace_counts, added to; only the counting shader uses it */
-#define LSP_BINDING_COUNT 15
-#define LSP_BINDING_NONE 15 /* of MATL's buffer, which the trace shader does not read */
+#define LSP_BINDING_QUEUE 15    /* LSP_VULKAN_QUEUE_HEAD, read and written; only passes use it */
+#define LSP_BINDING_COUNT 16
+#define LSP_BINDING_NONE 16 /* of MATL's buffer, which the trace shader does not read */
 
 /* Addresses in the table: those of the sections of bindings LSP_BINDING_NODES to LSP_BINDING_CELL_NODES. */
 #define LSP_VULKAN_ADDRESS_COUNT 11
@@ -111,6 +112,21 @@ LSP_END(LspHit)
 #define LSP_VULKAN_FLAGS_CONSTANT 1
 #define LSP_VULKAN_PARTS_CONSTANT 2
 
+/* And of rays through cells in passes, default LSP_VULKAN_FIRST_PASS: one that takes all rays from their beginning to
+ * the first cell that is to be traced exactly, one that traces it and takes them to the next, one that takes them
+ * to their end. */
+#define LSP_VULKAN_PASS_CONSTANT 3
+#define LSP_VULKAN_FIRST_PASS 0u
+#define LSP_VULKAN_CALL_PASS 1u
+#define LSP_VULKAN_LAST_PASS 2u
+#define LSP_VULKAN_PASS_KINDS 3u
+
+/* Of passes 1 to LSP_VULKAN_LAST the first words of the queue say, four each, how many rays wait, and how many work
+ * groups take them, a VkDispatchIndirectCommand. Behind them are two lists of rays, of passes with an odd number and
+ * an even one. */
+#define LSP_VULKAN_LAST 8u
+#define LSP_VULKAN_QUEUE_HEAD 36u /* words */
+
 /* Push constants, compute stage, from offset 0: rays [first, first + count) of the buffers. */
 LSP_BEGIN(lsp_vulkan_trace_constants)
   LSP_FLOAT lod; /* as in lsp_trace_options */
@@ -118,6 +134,14 @@ LSP_BEGIN(lsp_vulkan_trace_constants)
   LSP_UINT count; /* of rays, one an invocation */
   LSP_UINT dial; /* lsp_dial */
 LSP_END(lsp_vulkan_trace_constants)
+
+/* The same of a pass. */
+LSP_BEGIN(lsp_vulkan_pass_constants)
+  LSP_UINT pass;  /* 0, the first, to LSP_VULKAN_LAST */
+  LSP_UINT first; /* ray */
+  LSP_UINT count; /* of rays, which is the length of the queue's lists */
+  LSP_UINT dial;  /* lsp_dial */
+LSP_END(lsp_vulkan_pass_constants)
 
 /* The same through instances. */
 LSP_BEGIN(lsp_vulkan_instance_constants)
@@ -139,7 +163,7 @@ LSP_END(lsp_vulkan_instance_constants)
 
 #if defined(__cplusplus)
 static_assert(sizeof(LspRay) == 32 && sizeof(LspHit) == 32 && sizeof(lsp_vulkan_trace_constants) == 16 &&
-              sizeof(lsp_vulkan_instance_constants) == 16);
+              sizeof(lsp_vulkan_pass_constants) == 16 && sizeof(lsp_vulkan_instance_constants) == 16);
 #elif !defined(GL_core_profile)
 _Static_assert(sizeof(LspRay) == 32 && sizeof(LspHit) == 32, "as in ray and hit files and in shaders");
 _Static_assert(sizeof(lsp_vulkan_trace_constants) == 16, "as in shaders");

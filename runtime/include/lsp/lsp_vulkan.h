@@ -160,6 +160,8 @@ typedef struct lsp_vulkan_functions {
   PFN_vkCmdBindDescriptorSets cmd_bind_descriptor_sets; /* vkCmdBindDescriptorSets */
   PFN_vkCmdPushConstants cmd_push_constants;            /* vkCmdPushConstants */
   PFN_vkCmdDispatch cmd_dispatch;                       /* vkCmdDispatch */
+  PFN_vkCmdDispatchIndirect cmd_dispatch_indirect;      /* vkCmdDispatchIndirect */
+  PFN_vkCmdUpdateBuffer cmd_update_buffer;              /* vkCmdUpdateBuffer */
   PFN_vkUpdateDescriptorSets update_descriptor_sets;    /* vkUpdateDescriptorSets */
 } lsp_vulkan_functions;
 
@@ -193,6 +195,7 @@ typedef struct lsp_vulkan_kind {
   uint32_t parts;          /* LSP_PART_*; several scenes may share all that any of them needs */
   uint32_t dial;           /* lsp_vulkan_trace_constants.dial */
   uint32_t addresses;      /* nonzero: the shader reads sections through addresses, as of a plan */
+  uint32_t pass; /* LSP_VULKAN_*_PASS, of the shader of passes; lsp_vulkan_plan_trace sets the first */
 } lsp_vulkan_kind;
 
 /* What kind of trace `options` ask for of the scene with the plan's buffers. What these do not hold is not
@@ -240,6 +243,40 @@ LSP_API uint32_t lsp_vulkan_max_rays(const lsp_vulkan_limits* limits);
 LSP_API void lsp_vulkan_record_trace(const lsp_vulkan_functions* functions, VkCommandBuffer commands,
                                      VkPipeline pipeline, VkPipelineLayout layout, VkDescriptorSet set,
                                      const lsp_vulkan_trace_constants* constants);
+
+/* ---- cells in passes --------------------------------------------------------------------------------------
+ *
+ * A device runs invocations side by side, and of the rays through cells that it runs so, some are answered by
+ * tables while others are traced exactly in a cell, for which all wait. In passes a ray that comes to such a
+ * cell is left to the next dispatch, which takes all such rays side by side; a few times, and then to its
+ * end. Same hits, on lavapipe up to half as fast again; worth its dispatches for thousands of rays. */
+
+/* Usage and bytes of the buffer in which so many rays wait: the queue. */
+#define LSP_VULKAN_QUEUE_USAGE                                                \
+  (VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT | \
+   VK_BUFFER_USAGE_TRANSFER_DST_BIT)
+LSP_API VkDeviceSize lsp_vulkan_queue_bytes(uint32_t rays);
+
+/* Whether rays of this kind may wait: through cells, at another dial than LSP_DIAL_TABLES. */
+LSP_API int lsp_vulkan_has_passes(const lsp_vulkan_kind* kind);
+
+/* SPIR-V of the shader of passes, as of lsp_vulkan_trace_spirv, with the same layout and one specialization
+ * constant more, LSP_VULKAN_PASS_CONSTANT, for LSP_VULKAN_PASS_KINDS pipelines. Of the kind only `addresses`
+ * matters. It does not count: the trace shader does, the same work. */
+LSP_API const uint32_t* lsp_vulkan_passes_spirv(const lsp_vulkan_kind* kind, size_t* bytes);
+
+/* Points `set`, after lsp_vulkan_write_descriptors, at the queue. */
+LSP_API void lsp_vulkan_write_queue(const lsp_vulkan_functions* functions, VkDevice device,
+                                    VkDescriptorSet set, VkBuffer queue);
+
+/* Records the dispatches in place of lsp_vulkan_record_trace, with the pipelines in the order of
+ * LSP_VULKAN_*_PASS, what the queue begins with, and the barriers between them. Barriers before and after are
+ * the engine's, of rays and hits as there, of the queue against its use by earlier commands. The hits are
+ * read and written on the way. lod is not looked at. */
+LSP_API void lsp_vulkan_record_passes(const lsp_vulkan_functions* functions, VkCommandBuffer commands,
+                                      const VkPipeline pipelines[LSP_VULKAN_PASS_KINDS],
+                                      VkPipelineLayout layout, VkDescriptorSet set, VkBuffer queue,
+                                      const lsp_vulkan_trace_constants* constants);
 
 /* ---- instances ------------------------------------------------------------------------------------------
  *

@@ -29,13 +29,16 @@ struct VulkanOptions {
   bool validation = false;  // the Khronos layer, core and synchronization; see validation_messages
   bool addresses = false;   // read sections through buffer addresses even where other ways would do
   bool discrete = false;    // treat the device as a discrete GPU: staging buffers, never an import on its own
+  size_t passes_from =
+      4096;  // rays at once, from which on cells are traced in passes: lsp_vulkan_record_passes
 };
 
 struct VulkanTrace {
   double seconds = 0;         // wall clock, copies of rays and hits included
   double gpu_seconds = 0;     // in the shader, by the device's timestamps; 0 where it has none
   uint64_t retraced = 0;      // rays that the device cut short, traced again on the CPU
-  uint64_t batches = 0;       // dispatches
+  uint64_t batches = 0;       // of rays; a dispatch each, or with passes a dispatch a pass
+  bool passes = false;        // cells were traced in passes
   lsp_trace_counts counts{};  // rays and, if asked for, the rest
 };
 
