@@ -66,10 +66,9 @@ void record_pass_barrier(const lsp_vulkan_functions& functions, VkCommandBuffer 
 // Nobody waits for a pass yet.
 void record_queue_head(const lsp_vulkan_functions& functions, VkCommandBuffer commands, VkBuffer queue) {
   uint32_t head[LSP_VULKAN_QUEUE_HEAD]{};
-  for (uint32_t pass = 0; pass <= LSP_VULKAN_LAST; ++pass) head[4 * pass + 2] = head[4 * pass + 3] = 1;
+  for (uint32_t pass = 0; pass < LSP_VULKAN_PASSES; ++pass) head[4 * pass + 2] = head[4 * pass + 3] = 1;
   functions.cmd_update_buffer(commands, queue, 0, sizeof head, head);
 }
-static_assert(LSP_VULKAN_QUEUE_HEAD == 4 * (LSP_VULKAN_LAST + 1));
 
 }  // namespace
 
@@ -185,9 +184,10 @@ extern "C" void lsp_vulkan_record_passes(const lsp_vulkan_functions* functions, 
   lsp_vulkan_pass_constants pass{0, constants->first, constants->count, constants->dial};
   record_dispatch(*functions, commands, pipelines[LSP_VULKAN_FIRST_PASS], layout, set, &pass, sizeof pass,
                   pass.count);
-  for (pass.pass = 1; pass.pass <= LSP_VULKAN_LAST; ++pass.pass) {
+  for (pass.pass = 1; pass.pass < LSP_VULKAN_PASSES; ++pass.pass) {
     record_pass_barrier(*functions, commands);
-    const uint32_t kind = pass.pass < LSP_VULKAN_LAST ? LSP_VULKAN_CALL_PASS : LSP_VULKAN_LAST_PASS;
+    const bool last = pass.pass == LSP_VULKAN_PASSES - 1;
+    const uint32_t kind = last ? LSP_VULKAN_LAST_PASS : LSP_VULKAN_CALL_PASS;
     bind(*functions, commands, pipelines[kind], layout, set, &pass, sizeof pass);
     functions->cmd_dispatch_indirect(commands, queue, (4 * VkDeviceSize{pass.pass} + 1) * sizeof(uint32_t));
   }

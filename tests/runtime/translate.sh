@@ -27,6 +27,7 @@ translate() { # NAME SHADER DEFINES...
 translate bvh "$source/runtime/vulkan/trace.comp"
 translate ntree "$source/runtime/vulkan/trace.comp" -DLSP_NTREE
 translate cells "$source/runtime/vulkan/trace.comp" -DLSP_CELLS
+translate passes "$source/runtime/vulkan/trace_passes.comp"
 translate wide "$source/runtime/vulkan/trace.comp" -DLSP_WIDE
 translate instances "$source/runtime/vulkan/trace.comp" -DLSP_INSTANCES
 

@@ -121,11 +121,11 @@ LSP_END(LspHit)
 #define LSP_VULKAN_LAST_PASS 2u
 #define LSP_VULKAN_PASS_KINDS 3u
 
-/* Of passes 1 to LSP_VULKAN_LAST the first words of the queue say, four each, how many rays wait, and how many work
- * groups take them, a VkDispatchIndirectCommand. Behind them are two lists of rays, of passes with an odd number and
- * an even one. */
-#define LSP_VULKAN_LAST 8u
-#define LSP_VULKAN_QUEUE_HEAD 36u /* words */
+/* How many there are, the last of the last kind. In the queue there are four words for each, how many rays wait for it
+ * and a VkDispatchIndirectCommand of the work groups that take them; behind these two lists of rays, of passes with
+ * an even number and with an odd one. */
+#define LSP_VULKAN_PASSES 9u
+#define LSP_VULKAN_QUEUE_HEAD (4u * LSP_VULKAN_PASSES) /* words */
 
 /* Push constants, compute stage, from offset 0: rays [first, first + count) of the buffers. */
 LSP_BEGIN(lsp_vulkan_trace_constants)
@@ -137,7 +137,7 @@ LSP_END(lsp_vulkan_trace_constants)
 
 /* The same of a pass. */
 LSP_BEGIN(lsp_vulkan_pass_constants)
-  LSP_UINT pass;  /* 0, the first, to LSP_VULKAN_LAST */
+  LSP_UINT pass;  /* from 0 on; below LSP_VULKAN_PASSES */
   LSP_UINT first; /* ray */
   LSP_UINT count; /* of rays, which is the length of the queue's lists */
   LSP_UINT dial;  /* lsp_dial */
