@@ -471,6 +471,34 @@ TEST(CellsInPasses, AnyNumberOfRays) {
   fs::remove(path);
 }
 
+// Tables that say anything at all.
+TEST(CellsInPasses, SameBitsOfDamagedFiles) {
+  std::string why;
+  if (!VulkanTracer::available(&why)) GTEST_SKIP() << why;
+  const std::string path =
+      (fs::temp_directory_path() / ("lsp_test_damaged_" + std::to_string(getpid()) + ".lsp")).string();
+  lsp::Baked damaged = bake(room(), options_of_cells());
+  const std::vector<LspRay> rays = surface_rays(damaged, 5000, 1);
+  Random random(5);
+  for (uint32_t& two : damaged.cell_tables.entries)
+    if (random.below(8) == 0) two = random.next();
+  for (LspSplit& split : damaged.cell_tables.splits)
+    if (random.below(8) == 0) split = {random.next(), random.next()};
+  write_lsp(path, damaged, "{}", {});
+  {
+    const SceneFile file(path);
+    std::vector<LspHit> one(rays.size()), passes(rays.size());
+    VulkanTracer tracer;
+    tracer.load(file.scene(), LSP_USE_APPROXIMATE);
+    for (const float loss : {0.0f, 5.0f}) {
+      tracer.trace(tables_but(loss), rays, one, true);
+      EXPECT_TRUE(tracer.trace(tables_but(loss), rays, passes).passes);
+      EXPECT_TRUE(same_bits(one, passes)) << loss;
+    }
+  }
+  fs::remove(path);
+}
+
 INSTANTIATE_TEST_SUITE_P(Loads, CellsOnVulkan, testing::Values(0u, LSP_USE_ADDRESSES_ALWAYS));
 
 }  // namespace
