@@ -13,12 +13,13 @@
 
 #include "box.h"
 #include "lsp/program.h"
+#include "plane_cuts.h"
 #include "triangle_cut.h"
 
 namespace lsp {
 namespace {
 
-constexpr int kBins = 32;
+constexpr int kBins = PlaneCuts::kPlanes;
 constexpr size_t kTaskReferences = 4096;  // smaller subtrees are built by one task
 
 // Where this many nodes in a row found no spatial split worth its cost, those below are not asked any more:
@@ -302,21 +303,22 @@ class Builder {
     return bounds.hi[axis] - bounds.lo[axis] > float(kBins) * 4 * 0x1p-23f * reach;
   }
 
-  // The borders between bins along an axis of a node, and how many references begin and end in a bin.
+  // The borders between bins along an axis of a node, how many references begin and end in a bin, and the
+  // bounds of points of theirs that a split above or below the bin cannot part from it.
   struct SpatialBins {
     Binning bin;
-    std::array<float, kBins - 1> planes;  // above a bin
+    std::array<float, kBins> planes;  // above a bin
     std::array<uint32_t, kBins> entries{}, exits{};
+    std::array<Box4, kBins> points;
 
     SpatialBins(const Box& bounds, int axis) : bin(bounds.lo[axis], bounds.hi[axis]) {
       for (int b = 0; b + 1 < kBins; ++b) planes[b] = bin.plane(b + 1);
+      planes[kBins - 1] = INFINITY;
     }
   };
 
-  // No split along the axis costs less than this, but for rounding: a part of a triangle holds the corners on
-  // its side, and reaches to the plane.
-  double least_cost(const std::vector<Reference>& references, int axis, SpatialBins& bins) const {
-    std::array<Box4, kBins> corners;
+  // A part of a triangle holds the corners on its side.
+  void add_corners(const std::vector<Reference>& references, int axis, SpatialBins& bins) const {
     for (const Reference& r : references) {
       const int first = bins.bin(r.box.lo[axis]), last = bins.bin(r.box.hi[axis]);
       ++bins.entries[first];
@@ -325,12 +327,33 @@ class Builder {
       for (int c = 0; c < 3; ++c) {
         const glm::vec3& x = corner(r.triangle, c);
         const Float4 at = float4(x);
-        if (box.holds(at)) corners[std::clamp(bins.bin(x[axis]), first, last)].grow(at);
+        if (box.holds(at)) bins.points[std::clamp(bins.bin(x[axis]), first, last)].grow(at);
       }
     }
+  }
+
+  // And both parts hold the points in which the plane between them cuts its edges.
+  void add_cuts(const std::vector<Reference>& references, int axis, SpatialBins& bins) const {
+    PlaneCuts cuts;
+    for (const Reference& r : references) {
+      const int first = bins.bin(r.box.lo[axis]), last = bins.bin(r.box.hi[axis]);
+      if (first == last) continue;
+      cuts.add({corner(r.triangle, 0), corner(r.triangle, 1), corner(r.triangle, 2)}, r.box, axis,
+               bins.planes, first, last);
+    }
+    for (int b = 0; b + 1 < kBins; ++b) {
+      const Box4 cut = cuts.at(b, axis, bins.planes[b]);
+      bins.points[b].grow(cut);
+      bins.points[b + 1].grow(cut);
+    }
+  }
+
+  // No split along the axis costs less than this, but for rounding: its parts hold the bins' points, and
+  // reach to the plane.
+  double least_cost(size_t count, int axis, const SpatialBins& bins) const {
     double least = INFINITY;
     size_t left = 0, exited = 0;
-    sweep(corners, [&](int b, Box4 left_box, Box4 right_box) {
+    sweep(bins.points, [&](int b, Box4 left_box, Box4 right_box) {
       left += bins.entries[b - 1];
       exited += bins.exits[b - 1];
       if (left > exited) {
@@ -338,7 +361,7 @@ class Builder {
         left_box.hi = Int4{0, 1, 2, 3} == axis ? greater(left_box.hi, Float4{} + plane) : left_box.hi;
         right_box.lo = Int4{0, 1, 2, 3} == axis ? lesser(right_box.lo, Float4{} + plane) : right_box.lo;
       }
-      least = std::min(least, split_cost(left, left_box, references.size() - exited, right_box));
+      least = std::min(least, split_cost(left, left_box, count - exited, right_box));
     });
     return least;
   }
@@ -352,8 +375,13 @@ class Builder {
       SpatialBins bins(bounds, axis);
       if (bins.bin.scale == 0 || !separates(bounds, axis)) continue;
       constexpr double kRounding = 1e-4;
-      if ((1 - kRounding) * least_cost(references, axis, bins) > std::min(limit, best.cost)) continue;
-      try_planes(references, axis, bins, best);
+      const auto may_pay = [&] {
+        return (1 - kRounding) * least_cost(references.size(), axis, bins) <= std::min(limit, best.cost);
+      };
+      add_corners(references, axis, bins);
+      if (!may_pay()) continue;
+      add_cuts(references, axis, bins);
+      if (may_pay()) try_planes(references, axis, bins, best);
     }
     return best;
   }
