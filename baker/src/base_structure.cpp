@@ -1,7 +1,10 @@
 #include "base_structure.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "cells/cell_filler.h"
 #include "cells/closed_ways.h"
@@ -121,10 +124,11 @@ double tests_of_rays(const BakeJob& job) {
   const CellGrid& grid = job.baked.cell_grid;
   const Shard sample{1, uint32_t(std::max<size_t>(1, grid.cells.size() / kSample))};
   const size_t count = sample.share_of(grid.cells.size());
-  double tests = 0;
-  for (size_t i = 0; i < count; ++i)
-    tests += tests_of_ray(grid, job.baked.triangles, uint32_t(sample.item(i)));
-  return tests / double(std::max<size_t>(1, count));
+  std::vector<double> tests(count);
+  tbb::parallel_for(size_t(0), count, [&](size_t i) {
+    tests[i] = tests_of_ray(grid, job.baked.triangles, uint32_t(sample.item(i)));
+  });
+  return std::accumulate(tests.begin(), tests.end(), 0.0) / double(std::max<size_t>(1, count));
 }
 
 // Where triangles overlap everywhere, as in a heap of needles, a ray tests hundreds of them in a cell, and a

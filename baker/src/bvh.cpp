@@ -317,17 +317,28 @@ class Builder {
     }
   };
 
-  // A part of a triangle holds the corners on its side.
-  void add_corners(const std::vector<Reference>& references, int axis, SpatialBins& bins) const {
+  // A part of a triangle holds the corners on its side. Along all axes at once.
+  void add_corners(const std::vector<Reference>& references, std::array<SpatialBins, 3>& bins) const {
+    const Binning &x = bins[0].bin, &y = bins[1].bin, &z = bins[2].bin;
+    const Float4 lo = {x.lo, y.lo, z.lo, 0}, scale = {x.scale, y.scale, z.scale, 0};
+    const auto bins_of = [&](Float4 at) {  // as Binning
+      return __builtin_convertvector(lesser(greater(Float4{}, (at - lo) * scale), Float4{} + (kBins - 1)),
+                                     Int4);
+    };
     for (const Reference& r : references) {
-      const int first = bins.bin(r.box.lo[axis]), last = bins.bin(r.box.hi[axis]);
-      ++bins.entries[first];
-      ++bins.exits[last];
       const Box4 box(r.box);
+      const Int4 first = bins_of(box.lo), last = bins_of(box.hi);
+      for (int axis = 0; axis < 3; ++axis) {
+        ++bins[size_t(axis)].entries[size_t(first[axis])];
+        ++bins[size_t(axis)].exits[size_t(last[axis])];
+      }
       for (int c = 0; c < 3; ++c) {
-        const glm::vec3& x = corner(r.triangle, c);
-        const Float4 at = float4(x);
-        if (box.holds(at)) bins.points[std::clamp(bins.bin(x[axis]), first, last)].grow(at);
+        const Float4 at = float4(corner(r.triangle, c));
+        if (!box.holds(at)) continue;
+        Int4 bin = bins_of(at);
+        bin = bin < first ? first : bin;
+        bin = last < bin ? last : bin;
+        for (int axis = 0; axis < 3; ++axis) bins[size_t(axis)].points[size_t(bin[axis])].grow(at);
       }
     }
   }
@@ -371,14 +382,15 @@ class Builder {
   SpatialSplit find_spatial_split(const std::vector<Reference>& references, const Box& bounds,
                                   double limit) const {
     SpatialSplit best;
+    std::array<SpatialBins, 3> by_axis = {SpatialBins{bounds, 0}, {bounds, 1}, {bounds, 2}};
+    add_corners(references, by_axis);
     for (int axis = 0; axis < 3; ++axis) {
-      SpatialBins bins(bounds, axis);
+      SpatialBins& bins = by_axis[size_t(axis)];
       if (bins.bin.scale == 0 || !separates(bounds, axis)) continue;
       constexpr double kRounding = 1e-4;
       const auto may_pay = [&] {
         return (1 - kRounding) * least_cost(references.size(), axis, bins) <= std::min(limit, best.cost);
       };
-      add_corners(references, axis, bins);
       if (!may_pay()) continue;
       add_cuts(references, axis, bins);
       if (may_pay()) try_planes(references, axis, bins, best);
