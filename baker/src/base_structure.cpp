@@ -1,7 +1,10 @@
 #include "base_structure.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "cells/cell_filler.h"
 #include "cells/closed_ways.h"
@@ -73,23 +76,21 @@ void fill_ntree(BakeJob& job) {
     note_no_line_spaces(job.baked);
 }
 
-CellTables fill_tables(BakeJob& job, const CellTableOptions& options) {
+CellTables fill_tables(BakeJob& job, const CellTableOptions& options, bool keep) {
   const Baked& baked = job.baked;
   return fill_cell_tables(baked.cell_grid, baked.wide, baked.header, baked.triangles, baked.materials,
-                          options, job.stage("cells"));
+                          options, job.known_cells, keep, job.stage("cells"));
 }
 
 // Bytes that the tables will take, about: as those of some cells from all over the scene do, which are the
-// bake's meanwhile.
+// bake's meanwhile and need not be filled again.
 double estimate_tables(BakeJob& job) {
   constexpr size_t kSample = 64;
   Baked& baked = job.baked;
   const size_t cells = baked.cell_grid.cells.size();
   CellTableOptions options = job.options.cell_tables;
-  const Shard own = options.shard;
   options.shard = {1, uint32_t(std::max<size_t>(1, cells / kSample))};
-  baked.cell_tables = fill_tables(job, options);
-  job.filled = own.count == 1 && options.shard.count == 1;
+  baked.cell_tables = fill_tables(job, options, true);
   const double words = double(baked.cell_grid.words.size() * sizeof(uint32_t));
   const double filled = double(std::max<size_t>(1, baked.cell_tables.cells.size()));
   return words + (double(table_bytes(baked)) - words) * (double(cells) / filled);
@@ -109,7 +110,7 @@ void coarsen(BakeJob& job) {
     const double part = std::min(std::sqrt(0.97 * kSafe * most / tables), 1 - 1 / longest);
     try {
       grid = build_cell_grid(job.baked.triangles, job.bounds, std::max(1u, uint32_t(longest * part)));
-      job.filled = false;
+      job.known_cells.clear();
     } catch (const Failure& failure) {
       if (failure.exit() != Exit::kLimit) throw;
       return;  // a cell of that grid would hold too many triangles
@@ -123,10 +124,11 @@ double tests_of_rays(const BakeJob& job) {
   const CellGrid& grid = job.baked.cell_grid;
   const Shard sample{1, uint32_t(std::max<size_t>(1, grid.cells.size() / kSample))};
   const size_t count = sample.share_of(grid.cells.size());
-  double tests = 0;
-  for (size_t i = 0; i < count; ++i)
-    tests += tests_of_ray(grid, job.baked.triangles, uint32_t(sample.item(i)));
-  return tests / double(std::max<size_t>(1, count));
+  std::vector<double> tests(count);
+  tbb::parallel_for(size_t(0), count, [&](size_t i) {
+    tests[i] = tests_of_ray(grid, job.baked.triangles, uint32_t(sample.item(i)));
+  });
+  return std::accumulate(tests.begin(), tests.end(), 0.0) / double(std::max<size_t>(1, count));
 }
 
 // Where triangles overlap everywhere, as in a heap of needles, a ray tests hundreds of them in a cell, and a
@@ -180,7 +182,7 @@ void build_cells_base(BakeJob& job) {
 void fill_cells(BakeJob& job) {
   const CellTableOptions& options = job.options.cell_tables;
   Baked& baked = job.baked;
-  if (!job.filled) baked.cell_tables = fill_tables(job, options);
+  baked.cell_tables = fill_tables(job, options, false);
   set_cells(baked.cell_grid, baked.cell_tables, options, baked.header);
   const size_t cells = baked.cell_grid.words.size();
   baked.skipped.push_back("empty cells: " + with_commas(cells - baked.cell_grid.cells.size()) + " of " +

@@ -6,6 +6,7 @@
 
 #include "bake.h"
 #include "box.h"
+#include "cells/cell_filler.h"
 
 namespace lsp {
 
@@ -17,7 +18,7 @@ struct BakeJob {
   Bvh bvh;
   Box bounds;
   Baked& baked;
-  bool filled = false;  // its tables are there: to know their size took filling all of them
+  FilledCells known_cells = {};  // of its grid
 
   std::function<void(double)> stage(const char* name) const {
     return [&progress = progress, name](double done) {

@@ -13,12 +13,13 @@
 
 #include "box.h"
 #include "lsp/program.h"
+#include "plane_cuts.h"
 #include "triangle_cut.h"
 
 namespace lsp {
 namespace {
 
-constexpr int kBins = 32;
+constexpr int kBins = PlaneCuts::kPlanes;
 constexpr size_t kTaskReferences = 4096;  // smaller subtrees are built by one task
 
 // Where this many nodes in a row found no spatial split worth its cost, those below are not asked any more:
@@ -302,35 +303,68 @@ class Builder {
     return bounds.hi[axis] - bounds.lo[axis] > float(kBins) * 4 * 0x1p-23f * reach;
   }
 
-  // The borders between bins along an axis of a node, and how many references begin and end in a bin.
+  // The borders between bins along an axis of a node, how many references begin and end in a bin, and the
+  // bounds of points of theirs that a split above or below the bin cannot part from it.
   struct SpatialBins {
     Binning bin;
-    std::array<float, kBins - 1> planes;  // above a bin
+    std::array<float, kBins> planes;  // above a bin
     std::array<uint32_t, kBins> entries{}, exits{};
+    std::array<Box4, kBins> points;
 
     SpatialBins(const Box& bounds, int axis) : bin(bounds.lo[axis], bounds.hi[axis]) {
       for (int b = 0; b + 1 < kBins; ++b) planes[b] = bin.plane(b + 1);
+      planes[kBins - 1] = INFINITY;
     }
   };
 
-  // No split along the axis costs less than this, but for rounding: a part of a triangle holds the corners on
-  // its side, and reaches to the plane.
-  double least_cost(const std::vector<Reference>& references, int axis, SpatialBins& bins) const {
-    std::array<Box4, kBins> corners;
+  // A part of a triangle holds the corners on its side. Along all axes at once.
+  void add_corners(const std::vector<Reference>& references, std::array<SpatialBins, 3>& bins) const {
+    const Binning &x = bins[0].bin, &y = bins[1].bin, &z = bins[2].bin;
+    const Float4 lo = {x.lo, y.lo, z.lo, 0}, scale = {x.scale, y.scale, z.scale, 0};
+    const auto bins_of = [&](Float4 at) {  // as Binning
+      return __builtin_convertvector(lesser(greater(Float4{}, (at - lo) * scale), Float4{} + (kBins - 1)),
+                                     Int4);
+    };
     for (const Reference& r : references) {
-      const int first = bins.bin(r.box.lo[axis]), last = bins.bin(r.box.hi[axis]);
-      ++bins.entries[first];
-      ++bins.exits[last];
       const Box4 box(r.box);
+      const Int4 first = bins_of(box.lo), last = bins_of(box.hi);
+      for (int axis = 0; axis < 3; ++axis) {
+        ++bins[size_t(axis)].entries[size_t(first[axis])];
+        ++bins[size_t(axis)].exits[size_t(last[axis])];
+      }
       for (int c = 0; c < 3; ++c) {
-        const glm::vec3& x = corner(r.triangle, c);
-        const Float4 at = float4(x);
-        if (box.holds(at)) corners[std::clamp(bins.bin(x[axis]), first, last)].grow(at);
+        const Float4 at = float4(corner(r.triangle, c));
+        if (!box.holds(at)) continue;
+        Int4 bin = bins_of(at);
+        bin = bin < first ? first : bin;
+        bin = last < bin ? last : bin;
+        for (int axis = 0; axis < 3; ++axis) bins[size_t(axis)].points[size_t(bin[axis])].grow(at);
       }
     }
+  }
+
+  // And both parts hold the points in which the plane between them cuts its edges.
+  void add_cuts(const std::vector<Reference>& references, int axis, SpatialBins& bins) const {
+    PlaneCuts cuts;
+    for (const Reference& r : references) {
+      const int first = bins.bin(r.box.lo[axis]), last = bins.bin(r.box.hi[axis]);
+      if (first == last) continue;
+      cuts.add({corner(r.triangle, 0), corner(r.triangle, 1), corner(r.triangle, 2)}, r.box, axis,
+               bins.planes, first, last);
+    }
+    for (int b = 0; b + 1 < kBins; ++b) {
+      const Box4 cut = cuts.at(b, axis, bins.planes[b]);
+      bins.points[b].grow(cut);
+      bins.points[b + 1].grow(cut);
+    }
+  }
+
+  // No split along the axis costs less than this, but for rounding: its parts hold the bins' points, and
+  // reach to the plane.
+  double least_cost(size_t count, int axis, const SpatialBins& bins) const {
     double least = INFINITY;
     size_t left = 0, exited = 0;
-    sweep(corners, [&](int b, Box4 left_box, Box4 right_box) {
+    sweep(bins.points, [&](int b, Box4 left_box, Box4 right_box) {
       left += bins.entries[b - 1];
       exited += bins.exits[b - 1];
       if (left > exited) {
@@ -338,7 +372,7 @@ class Builder {
         left_box.hi = Int4{0, 1, 2, 3} == axis ? greater(left_box.hi, Float4{} + plane) : left_box.hi;
         right_box.lo = Int4{0, 1, 2, 3} == axis ? lesser(right_box.lo, Float4{} + plane) : right_box.lo;
       }
-      least = std::min(least, split_cost(left, left_box, references.size() - exited, right_box));
+      least = std::min(least, split_cost(left, left_box, count - exited, right_box));
     });
     return least;
   }
@@ -348,12 +382,18 @@ class Builder {
   SpatialSplit find_spatial_split(const std::vector<Reference>& references, const Box& bounds,
                                   double limit) const {
     SpatialSplit best;
+    std::array<SpatialBins, 3> by_axis = {SpatialBins{bounds, 0}, {bounds, 1}, {bounds, 2}};
+    add_corners(references, by_axis);
     for (int axis = 0; axis < 3; ++axis) {
-      SpatialBins bins(bounds, axis);
+      SpatialBins& bins = by_axis[size_t(axis)];
       if (bins.bin.scale == 0 || !separates(bounds, axis)) continue;
       constexpr double kRounding = 1e-4;
-      if ((1 - kRounding) * least_cost(references, axis, bins) > std::min(limit, best.cost)) continue;
-      try_planes(references, axis, bins, best);
+      const auto may_pay = [&] {
+        return (1 - kRounding) * least_cost(references.size(), axis, bins) <= std::min(limit, best.cost);
+      };
+      if (!may_pay()) continue;
+      add_cuts(references, axis, bins);
+      if (may_pay()) try_planes(references, axis, bins, best);
     }
     return best;
   }

@@ -178,10 +178,20 @@ class Collapse {
     fate.hit = 1 - fate.hit;
     return fate;
   }
+  // A stable sort: there are few.
   void sort_by_worth(std::vector<Branch>& branches) const {
-    std::stable_sort(branches.begin(), branches.end(), [&](const Branch& a, const Branch& b) {
-      return fate_of(a).worth() > fate_of(b).worth();
-    });
+    std::array<double, kChildren> worth;
+    for (size_t i = 0; i < branches.size(); ++i) {
+      const Branch branch = branches[i];
+      const double own = fate_of(branch).worth();
+      size_t at = i;
+      for (; at > 0 && own > worth[at - 1]; --at) {
+        worth[at] = worth[at - 1];
+        branches[at] = branches[at - 1];
+      }
+      worth[at] = own;
+      branches[at] = branch;
+    }
   }
 
   void collect(uint32_t ref, std::vector<uint32_t*>& leaves) {

@@ -1,7 +1,9 @@
 #include "cell_answers.h"
 
+#include <bit>
 #include <cmath>
 
+#include "../clones.h"
 #include "../vectors.h"
 #include "cell_tables.h"
 
@@ -14,6 +16,19 @@ constexpr float kSameLook = 0.02f;
 
 // Splits are numbered behind the planes, whose number is not known yet: from kSplits on for now.
 constexpr uint32_t kSplits = 0x1000, kTooMany = UINT32_MAX;
+
+constexpr size_t kLanes = 16;
+
+// Those of kLanes normals, a bit each, that point the same way or the opposite one.
+LSP_CLONES uint32_t same_directions(const float* x, const float* y, const float* z, const glm::vec3& normal) {
+  uint32_t bits[kLanes];
+  const float nx = normal.x, ny = normal.y, nz = normal.z;
+  for (size_t i = 0; i < kLanes; ++i)
+    bits[i] = std::fabs(x[i] * nx + y[i] * ny + z[i] * nz) > kSameDirection ? 1u << i : 0u;
+  uint32_t all = 0;
+  for (size_t i = 0; i < kLanes; ++i) all |= bits[i];
+  return all;
+}
 
 }  // namespace
 
@@ -36,13 +51,23 @@ uint32_t CellAnswers::plane_of(uint32_t triangle) {
   const glm::dvec3 normal = length > 0 ? area / length : glm::dvec3(0, 0, 1);
   const Plane plane = {glm::vec3(normal), float(glm::dot(normal, a - glm::dvec3(centre_))),
                        colors_.empty() ? glm::vec3(0) : colors_[t.material]};
-  for (uint32_t k = 0; k < planes_.size(); ++k) {
-    const float same = glm::dot(planes_[k].normal, plane.normal);
-    if (std::fabs(same) > kSameDirection && unlike(planes_[k], plane) < kSameLook &&
-        std::fabs(planes_[k].distance - std::copysign(plane.distance, plane.distance * same)) <
-            kSameDistance * size_ &&
-        (triangles_[plane_records_[k]].flags ^ t.flags) >> LSP_TRIANGLE_GAPS_SHIFT == 0)
-      return found = k;
+  for (size_t first = 0; first < planes_.size(); first += kLanes) {
+    uint32_t rest =
+        same_directions(&normals_[0][first], &normals_[1][first], &normals_[2][first], plane.normal);
+    for (; rest != 0; rest &= rest - 1) {
+      const auto k = uint32_t(first) + uint32_t(std::countr_zero(rest));
+      const float same = glm::dot(planes_[k].normal, plane.normal);
+      if (unlike(planes_[k], plane) < kSameLook &&
+          std::fabs(planes_[k].distance - std::copysign(plane.distance, plane.distance * same)) <
+              kSameDistance * size_ &&
+          (triangles_[plane_records_[k]].flags ^ t.flags) >> LSP_TRIANGLE_GAPS_SHIFT == 0)
+        return found = k;
+    }
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<float>& normals = normals_[size_t(axis)];
+    if (planes_.size() == normals.size()) normals.resize(normals.size() + kLanes);
+    normals[planes_.size()] = plane.normal[axis];
   }
   planes_.push_back(plane);
   plane_records_.push_back(records_[triangle]);

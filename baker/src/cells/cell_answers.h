@@ -1,6 +1,7 @@
 // The answers of one cell while its tables are filled: its planes, its splits, and how entries name them.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <unordered_map>
@@ -43,6 +44,7 @@ class CellAnswers {
   float size_;
   std::vector<uint32_t> plane_of_;  // by triangle of the cell
   std::vector<Plane> planes_;
+  std::array<std::vector<float>, 3> normals_;  // of these, by axis; padded
   std::vector<uint32_t> plane_records_;
   std::vector<LspSplit> splits_;
   std::unordered_map<uint64_t, uint32_t> split_numbers_;

@@ -1,6 +1,8 @@
 // Fills the tables of one cell.
 #pragma once
 
+#include <map>
+
 #include "answer_fit.h"
 #include "cell_tables.h"
 #include "cell_tree.h"
@@ -29,6 +31,17 @@ struct FilledCell {
   bool overflow = false;
 };
 FilledCell fill_cell(const CellScene& scene, uint32_t cell);
+
+// Cells of a grid that were filled to know how long tables become, by their number.
+using FilledCells = std::map<uint32_t, FilledCell>;
+
+// Fills the tables of the shard's cells of the grid on all threads of the current oneTBB arena; the result
+// does not depend on their number, nor that of a cell on the other cells. `tree` is of the triangles. What is
+// in `known` already is taken from there; with `keep` what is filled is added to it.
+CellTables fill_cell_tables(const CellGrid& grid, const WideTree& tree, const LspHeader& header,
+                            std::span<const LspTriangle> triangles, std::span<const LspMaterial> materials,
+                            const CellTableOptions& options, FilledCells& known, bool keep,
+                            const std::function<void(double)>& progress = {});
 
 // Boxes and triangles that a ray through a cell tests in the cell's own tree, on average: what filling it
 // costs grows with them.

@@ -64,7 +64,8 @@ uint32_t loss_class(float loss) {
 
 CellTables fill_cell_tables(const CellGrid& grid, const WideTree& tree, const LspHeader& header,
                             std::span<const LspTriangle> triangles, std::span<const LspMaterial> materials,
-                            const CellTableOptions& options, const std::function<void(double)>& progress) {
+                            const CellTableOptions& options, FilledCells& known, bool keep,
+                            const std::function<void(double)>& progress) {
   std::vector<LspTriangle> numbered(triangles.begin(), triangles.end());
   for (size_t i = 0; i < numbered.size(); ++i) numbered[i].primitive = uint32_t(i);
   LspHeader whole_header = header;
@@ -88,7 +89,9 @@ CellTables fill_cell_tables(const CellGrid& grid, const WideTree& tree, const Ls
     std::vector<FilledCell> filled(end - begin);
     const auto fill = [&](const tbb::blocked_range<size_t>& range) {
       for (size_t i = range.begin(); i < range.end(); ++i) {
-        filled[i - begin] = fill_cell(scene, uint32_t(options.shard.item(i)));
+        const auto cell = uint32_t(options.shard.item(i));
+        const auto found = known.find(cell);
+        filled[i - begin] = found == known.end() ? fill_cell(scene, cell) : std::move(found->second);
         const size_t now = ++done;
         if (progress && now % 16 == 0) progress(double(now) / double(cells));
       }
@@ -96,6 +99,8 @@ CellTables fill_cell_tables(const CellGrid& grid, const WideTree& tree, const Ls
     // One at a time: cells differ much in what they take.
     tbb::parallel_for(tbb::blocked_range<size_t>(begin, end, 1), fill, tbb::simple_partitioner());
     for (const FilledCell& f : filled) add_to(tables, f, grid.size);
+    for (size_t i = begin; keep && i < end; ++i)
+      known[uint32_t(options.shard.item(i))] = std::move(filled[i - begin]);
   }
   return tables.finish();
 }

@@ -64,13 +64,6 @@ class CellTablesBuilder {
 inline uint64_t far_words(uint64_t patches) { return 15 * patches * patches * patches * patches; }
 inline uint64_t origin_words(uint64_t patches) { return 3 * patches * patches; }
 
-// Fills the tables of the shard's cells of the grid on all threads of the current oneTBB arena; the result
-// does not depend on their number, nor that of a cell on the other cells. `tree` is of the triangles.
-CellTables fill_cell_tables(const CellGrid& grid, const WideTree& tree, const LspHeader& header,
-                            std::span<const LspTriangle> triangles, std::span<const LspMaterial> materials,
-                            const CellTableOptions& options,
-                            const std::function<void(double)>& progress = {});
-
 // Writes what the header states of grid and tables, but for the dial.
 void set_cells(const CellGrid& grid, const CellTables& tables, const CellTableOptions& options,
                LspHeader& header);

@@ -54,17 +54,19 @@ struct DialError {
   double depth = 0;    // mean error of the distance where both hit, in diagonals
   double picture = 0;  // of ambient occlusion, over its mean or 0.25: the worse of a short and a long radius
   double light = 0;    // of the light that comes back to a point, over its mean
-  lsp_trace_counts counts{};
 };
 
 struct Rays {
   std::vector<LspRay> rays;  // kPerPoint of each point, one after the other
   std::vector<View> views;   // of them
   std::vector<LspHit> truth;
-  lsp_trace_counts counts{};               // of exact rays
-  std::map<uint32_t, DialError> measured;  // by dial: what is known already
+  lsp_trace_counts counts{};  // of exact rays
+  // By dial: what is known already.
+  std::map<uint32_t, DialError> measured;
+  std::map<uint32_t, lsp_trace_counts> counted;
 };
 
+// `counts` may be null: rays that are not counted take a third of the time.
 std::vector<LspHit> trace(const lsp_scene& scene, const lsp_trace_options& options,
                           const std::vector<LspRay>& rays, lsp_trace_counts* counts) {
   std::vector<LspHit> hits(rays.size());
@@ -73,10 +75,11 @@ std::vector<LspHit> trace(const lsp_scene& scene, const lsp_trace_options& optio
   std::vector<lsp_trace_counts> sums(parts);
   tbb::parallel_for(size_t(0), parts, [&](size_t p) {
     const size_t first = p * kPart;
-    lsp_trace(&scene, &options, &rays[first], &hits[first], std::min(kPart, rays.size() - first), &sums[p],
-              nullptr);
+    lsp_trace(&scene, &options, &rays[first], &hits[first], std::min(kPart, rays.size() - first),
+              counts ? &sums[p] : nullptr, nullptr);
   });
-  for (const lsp_trace_counts& sum : sums) lsp_add_counts(counts, &sum);
+  if (counts)
+    for (const lsp_trace_counts& sum : sums) lsp_add_counts(counts, &sum);
   return hits;
 }
 
@@ -133,7 +136,7 @@ class Dial {
       out.occlusion = std::max(out.occlusion, error.picture);
       out.light = std::max(out.light, error.light);
       lsp_add_counts(&exact, &set.counts);
-      lsp_add_counts(&cells, &error.counts);
+      lsp_add_counts(&cells, &counted(set, quality));
     }
     if (exact.rays == 0) return {};
     const Costs cpu = cpu_costs(exact_bytes_);
@@ -144,28 +147,38 @@ class Dial {
 
   // The dial that is cheapest over all rays of those that keep within errors, or the finest, and that heed no
   // more of either table than `most`. The more of the origin tables is heeded, the less of the far tables can
-  // be: a walk along the border of what is within.
+  // be: a walk along the border of what is within. Of those that heed as much of the far tables only the last
+  // one is counted, which traces least exactly.
   uint32_t cheapest(double wrong, uint32_t most) {
     // What nobody knows is never heeded: rays of other places than these may come there.
     constexpr uint32_t kClasses[] = {0, 1, 2, 3, 4, 5, 6, LSP_LOSS_UNKNOWN};
     uint32_t best = LSP_DIAL(0u, 0u);
     double least = INFINITY;
-    const size_t nears = heeded(kClasses, most & 0xFFu);
-    for (size_t near = 0, far = heeded(kClasses, most >> 8u); near < nears && far > 0;) {
-      const uint32_t dial = LSP_DIAL(kClasses[near], kClasses[far - 1]);
+    const auto weigh = [&](uint32_t dial) {
       header_.quality[LSP_QUALITY_BALANCED] = dial;
-      if (!keeps(wrong)) {
-        --far;
-        continue;
-      }
       double cost = 0;
-      for (Rays& set : sets_) cost += kVulkan.cells(measured(set, LSP_QUALITY_BALANCED).counts);
+      for (Rays& set : sets_) cost += kVulkan.cells(counted(set, LSP_QUALITY_BALANCED));
       if (cost < least) {
         least = cost;
         best = dial;
       }
-      ++near;
+    };
+    constexpr uint32_t kNone = UINT32_MAX;
+    uint32_t kept = kNone;
+    const size_t nears = heeded(kClasses, most & 0xFFu);
+    for (size_t near = 0, far = heeded(kClasses, most >> 8u); near < nears && far > 0;) {
+      const uint32_t dial = LSP_DIAL(kClasses[near], kClasses[far - 1]);
+      header_.quality[LSP_QUALITY_BALANCED] = dial;
+      if (keeps(wrong)) {
+        kept = dial;
+        ++near;
+        continue;
+      }
+      if (kept != kNone) weigh(kept);
+      kept = kNone;
+      --far;
     }
+    if (kept != kNone) weigh(kept);
     return best;
   }
 
@@ -238,12 +251,22 @@ class Dial {
     return known->second;
   }
 
-  DialError measure(const Rays& set, uint32_t quality) const {
-    DialError error;
+  const lsp_trace_counts& counted(Rays& set, uint32_t quality) const {
+    const auto [known, added] = set.counted.try_emplace(header_.quality[quality]);
+    if (added) trace(scene_, options_of(quality), set.rays, &known->second);
+    return known->second;
+  }
+
+  static lsp_trace_options options_of(uint32_t quality) {
     lsp_trace_options options{};
     options.flags = LSP_TRACE_APPROXIMATE;
     options.quality = quality;
-    const std::vector<LspHit> hits = trace(scene_, options, set.rays, &error.counts);
+    return options;
+  }
+
+  DialError measure(const Rays& set, uint32_t quality) const {
+    DialError error;
+    const std::vector<LspHit> hits = trace(scene_, options_of(quality), set.rays, nullptr);
     size_t wrong = 0, both = 0;
     double depth = 0;
     for (size_t i = 0; i < hits.size(); ++i) {
