@@ -166,6 +166,24 @@ TEST(Triangulate, OutlinesThatTouchThemselves) {
   expect_filled(hair, "a line there and back");
 }
 
+// Corners that lay on lines lie beside them by what rounds, on one side as seen from some and on the other as
+// seen from others.
+TEST(Triangulate, OutlinesOfCellsTurned) {
+  const Outline cells[] = {
+      {{0, 0}, {1, 0}, {1, 1}, {1, 2}, {1, 3}, {0, 3}, {-1, 3}, {-1, 2}, {0, 2}, {0, 1}},
+      {{0, 0}, {1, 0}, {2, 0}, {3, 0}, {3, 1}, {2, 1}, {2, 2}, {2, 3}, {1, 3}, {1, 2}, {1, 1}, {0, 1}},
+      {{0, 0}, {1, 0}, {1, 1}, {2, 1}, {2, 2}, {3, 2}, {3, 3}, {2, 3}, {1, 3}, {0, 3}, {0, 2}, {0, 1}},
+      {{0, 0}, {1, 0}, {2, 0}, {2, 1}, {1, 1}, {1, 2}, {2, 2}, {2, 3}, {1, 3}, {0, 3}, {0, 2}, {0, 1}}};
+  for (const Outline& outline : cells) {
+    for (int i = 0; i < 1000; ++i) {
+      const double c = std::cos(0.37 * i), s = std::sin(0.37 * i);
+      Outline turned;
+      for (const glm::dvec2& p : outline) turned.push_back({c * p.x - s * p.y, s * p.x + c * p.y});
+      expect_filled(turned, "cells");
+    }
+  }
+}
+
 // Rows of square holes in one outline, each over a bridge from the left.
 TEST(Triangulate, ManyHoles) {
   Outline outline = {{0, 0}, {40, 0}, {40, 40}, {0, 40}};
