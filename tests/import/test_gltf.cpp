@@ -121,9 +121,10 @@ TEST_F(Gltf, WhatIsNotReadIsNotedOnce) {
   document.root["meshes"][0]["primitives"].push_back({{"attributes", attributes}});
   document.root["extensionsUsed"] = {"KHR_lights_punctual", "KHR_texture_transform"};
   document.root["animations"] = {json::object()};
+  document.root["cameras"] = {{{"type", "perspective"}}, {{"type", "perspective"}}};
   const Mesh mesh = import(document);
-  EXPECT_EQ(mesh.notes.size(), 4u);
-  for (const char* part : {"_HEAT", "COLOR_1", "KHR_lights_punctual", "animations"})
+  EXPECT_EQ(mesh.notes.size(), 5u);
+  for (const char* part : {"_HEAT", "COLOR_1", "KHR_lights_punctual", "animations", "cameras (2)"})
     EXPECT_TRUE(has_note(mesh, part)) << part;
   EXPECT_TRUE(import(triangle()).notes.empty());
 }

@@ -239,6 +239,8 @@ std::vector<std::string> unread_parts(const json& document) {
     for (const json& node : nodes) collect_unread(node, of_nodes);
     parts.insert(parts.end(), of_nodes.begin(), of_nodes.end());
   }
+  if (const size_t cameras = member(document, "cameras").size(); cameras > 0)
+    parts.push_back("its cameras (" + std::to_string(cameras) + ") are not read");
   if (member(document, "scenes").size() > 1 && !member(document, "scene").is_null()) {
     parts.push_back("only the default one of its scenes is read");
   } else if (member(document, "scenes").size() > 1) {
