@@ -488,6 +488,11 @@ TEST_F(Variants, TextureCoordinatesThatAreNotFinite) {
       import("a.obj", "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt nan nan\nf 1/1 2/1 3/1\n");
   EXPECT_EQ(mesh.notes.size(), 1u);
   EXPECT_TRUE(has_note(mesh, "or no finite ones, its corner texel holds"));
+  const Mesh far = import("a.obj",
+                          "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1e20 0\nvt 0 1\n"
+                          "f 1/1 2/2 3/3\nf 1/1 2/2 3/1\n");
+  for (size_t t = 0; t < 2; ++t)
+    EXPECT_EQ(far.color(t).base_color, glm::vec3(0.5f, 0, 0.5f)) << "the mean of what it runs over so often";
 }
 
 TEST_F(Variants, OffTexturesBehindAColourAreNoAlpha) {

@@ -92,8 +92,8 @@ class Footprint {
     const glm::dvec2 extent = glm::max(at_[0], glm::max(at_[1], at_[2])) - low;
     longest_ = std::max(extent.x, extent.y);
     area_ = std::abs(cross(at_[1] - at_[0], at_[2] - at_[0])) / 2;
-    usable_ =
-        std::isfinite(area_) && std::isfinite(longest_) && std::abs(low.x) < 1e12 && std::abs(low.y) < 1e12;
+    constexpr double kMost = 1e12;  // so that places fit into whole numbers
+    usable_ = std::isfinite(area_) && longest_ < kMost && std::abs(low.x) < kMost && std::abs(low.y) < kMost;
     small_ = !(area_ >= 1) && (!use.nearest || area_ < 1e-9);
     while (!small_ && level_ + 1 < use.texture->levels() && !fits(most_texels)) ++level_;
     if (!small_ && !fits(most_texels)) usable_ = false;
