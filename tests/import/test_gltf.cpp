@@ -64,6 +64,22 @@ TEST_F(Gltf, TheHeadersLengthEndsABinaryFileUnlessItIsWrong) {
   }
 }
 
+TEST_F(Gltf, ChunksThatAreNotReadAreNotedOnce) {
+  std::string more = triangle().glb();
+  for (const char* type : {"XYZ1", "XYZ1", "BIN"}) {
+    append(more, uint32_t{4});
+    more.append(type, 4);
+    more += "abcd";
+  }
+  const auto length = uint32_t(more.size());
+  std::memcpy(more.data() + 8, &length, sizeof length);
+  const Mesh mesh = MeshFiles::import("a.glb", more);
+  EXPECT_EQ(mesh.triangles.size(), 1u);
+  EXPECT_EQ(mesh.notes.size(), 2u);
+  EXPECT_TRUE(has_note(mesh, "chunks of the type XYZ1 are not read"));
+  EXPECT_TRUE(has_note(mesh, "more chunks of a kind"));
+}
+
 TEST_F(Gltf, UrisAsExportersWriteThem) {
   Document document = triangle();
   std::filesystem::create_directory(folder_ / "sub");
