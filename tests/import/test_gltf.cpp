@@ -512,6 +512,32 @@ TEST_F(Gltf, AccessorsAndViewsOutsideTheirBuffers) {
   refused("nodes", "children", json::array({9}));
 }
 
+TEST_F(Gltf, RefusalsNameTheAccessor) {
+  const auto message = [&](int accessor, const char* key, const json& value) {
+    Document document;
+    const int position = document.vec3(kTriangle);
+    const int indices = document.indices<uint16_t>({0, 1, 2}, kUshort);
+    document.node(
+        {{"mesh", document.mesh({{"attributes", {{"POSITION", position}}}, {"indices", indices}})}});
+    document.root["accessors"][size_t(accessor)][key] = value;
+    const Refusal refused = refusal(document);
+    EXPECT_EQ(refused.exit, Exit::kInvalid) << key << value;
+    return refused.message;
+  };
+  EXPECT_NE(message(0, "count", 4'000'000'000).find("accessor 0 reaches beyond"), std::string::npos)
+      << "and not that memory is short";
+  EXPECT_NE(message(1, "count", 4'000'000'000).find("accessor 1 reaches beyond"), std::string::npos);
+  EXPECT_NE(message(0, "type", "VEC2").find("accessor 0"), std::string::npos);
+  EXPECT_NE(message(1, "componentType", kFloat).find("accessor 1"), std::string::npos);
+  const auto sparse = [](int view, int count) {
+    return json{{"count", count},
+                {"indices", {{"bufferView", view}, {"componentType", kUshort}}},
+                {"values", {{"bufferView", 0}}}};
+  };
+  EXPECT_NE(message(0, "sparse", sparse(1, 4)).find("the sparse part of accessor 0 reaches"),
+            std::string::npos);
+}
+
 TEST_F(Gltf, WholeNumbersMayBeWrittenAsFloats) {
   Document document;
   const int view = document.view(std::string(36, 'x'));

@@ -170,7 +170,7 @@ GltfPrimitives::Values GltfPrimitives::read_values(const tinygltf::Primitive& so
   const GltfDraco::Decoded* decoded = draco_.find(source);
   if (decoded && decoded->values.contains(name)) {
     out.floats = decoded->values.at(name);
-    accessors_.overlay_sparse(accessors_.at(found->second), out.components, out.floats);
+    accessors_.overlay_sparse(found->second, out.components, out.floats);
   } else if (!decoded || accessors_.at(found->second).bufferView >= 0 || !GltfDraco::names(source, name)) {
     out.floats = accessors_.floats(found->second, out.components);
   }

@@ -148,8 +148,9 @@ void make_integers(const std::string& file, std::string_view key, json& value) {
   } else if (value.is_array()) {
     for (json& item : value) make_integers(file, key, item);
   } else if (is_integer_key(key) &&
-             !(key == "mode" && value.is_string())) {  // EXT_meshopt_compression's is text
-    constexpr double kLargest = 9007199254740992.0;    // 2^53: beyond, doubles skip integers
+             !(key == "mode" && (value == "ATTRIBUTES" || value == "TRIANGLES" ||
+                                 value == "INDICES"))) {  // EXT_meshopt_compression's is text
+    constexpr double kLargest = 9007199254740992.0;       // 2^53: beyond, doubles skip integers
     if (value.is_number_float()) {
       const auto number = value.get<double>();
       if (number >= 0 && number <= kLargest && number == std::floor(number)) value = uint64_t(number);
