@@ -50,7 +50,7 @@ struct Mesh {
   uint64_t primitive_count = 0;                   // triangles in import order, rejected ones included
   Rejected rejected;                              // triangles.size() + rejected.total() = primitive_count
   std::vector<std::string> notes;                 // what was skipped or assumed, for the report
-  // Per input: itself, and after it every file beside it whose content is in the mesh.
+  // Per input: itself, then each file beside it that is in the mesh, or would be were it there.
   std::vector<std::vector<std::filesystem::path>> sources;
 
   TriangleColor color(size_t t) const {

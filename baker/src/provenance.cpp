@@ -34,7 +34,10 @@ void write_depfile(const Arguments& a, const std::vector<std::vector<std::filesy
   };
   std::string rule = escaped(a.output) + ":";
   for (const auto& files : sources) {
-    for (const auto& file : files) rule += " \\\n  " + escaped(file);
+    for (const auto& file : files) {
+      std::error_code error;  // a file that is not there would make Make give up
+      if (std::filesystem::is_regular_file(file, error)) rule += " \\\n  " + escaped(file);
+    }
   }
   write_file(a.depfile, rule + "\n");
 }

@@ -413,6 +413,37 @@ TEST_F(LspBake, EveryFileReadIsInTheHashAndTheDepfile) {
   EXPECT_EQ(validate("b.lsp", "'my scene/a.obj'"), 7);
 }
 
+// They are no dependencies, without which Make would give up, but a bake is stale once they are there.
+TEST_F(LspBake, FilesThatAreMissingMakeItStaleOnceTheyAreThere) {
+  const std::string triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl x\nf 1/1 2/1 3/1\n";
+  std::ofstream(folder_ / "a.obj") << "mtllib a.mtl b.mtl\n" << triangle;
+  std::ofstream(folder_ / "a.mtl") << "newmtl x\nmap_Kd maps\\no.png\nmap_Ke maps\n";
+  fs::create_directory(folder_ / "maps");
+  const std::string picture = R"({"uri": "no%20way.png"})";
+  std::ofstream(folder_ / "a.gltf") << R"({"asset": {"version": "2.0"}, "nodes": [{"mesh": 0}], "meshes": [
+    {"primitives": [{"attributes": {"POSITION": 0}, "material": 0}]}], "materials": [{"pbrMetallicRoughness":
+    {"baseColorTexture": {"index": 0}}}], "textures": [{"source": 0}], "images": [)"
+                                    << picture << R"(],
+    "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+    "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"byteLength": 36, "uri":
+    "data:;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]})";
+  ASSERT_EQ(run("a.obj -o a.lsp --base wide --depfile a.d"), 0);
+  EXPECT_EQ(read("a.d"), "a.lsp: \\\n  a.obj \\\n  a.mtl\n");
+  ASSERT_EQ(run("a.gltf -o b.lsp --base wide"), 0);
+  const auto validate = [&](const std::string& arguments) {
+    return shell("lsp-validate --quiet " + arguments + " 2>/dev/null", folder_);
+  };
+  for (const char* missing : {"b.mtl", "maps/no.png"}) {
+    EXPECT_EQ(validate("a.lsp --mesh a.obj"), 0);
+    std::ofstream(folder_ / missing) << "x";
+    EXPECT_EQ(validate("a.lsp --mesh a.obj"), 7) << missing;
+    fs::remove(folder_ / missing);
+  }
+  EXPECT_EQ(validate("b.lsp --mesh a.gltf"), 0);
+  std::ofstream(folder_ / "no way.png") << "x";
+  EXPECT_EQ(validate("b.lsp --mesh a.gltf"), 7);
+}
+
 TEST_F(LspBake, KeepsWhatTheErrorAllows) {
   ASSERT_EQ(run("grid.obj -o a.lsp --base bvh --max-error 20 --json"), 0);
   EXPECT_LE(nlohmann::json::parse(read("out"))["error"]["wrong_percent"], 20.0);

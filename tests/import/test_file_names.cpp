@@ -76,7 +76,36 @@ TEST_F(FileNames, DataUrisAsPeopleWriteThem) {
     EXPECT_EQ(mesh.color(0).base_color, kRed) << uri;
     EXPECT_TRUE(mesh.notes.empty()) << uri;
   }
-  EXPECT_TRUE(has_note(with_picture("data:image/png,abc"), "not base64"));
+  EXPECT_TRUE(has_note(with_picture("data:image/png;base64,!!"), "not base64"));
+  EXPECT_TRUE(has_note(with_picture("data:image/png"), "without a comma"));
+  EXPECT_TRUE(has_note(with_picture("data:image/png,abc"), "is of no format known here"));
+}
+
+TEST_F(FileNames, DataUrisInPercentCodes) {
+  std::string uri = "data:image/png,";
+  constexpr char kDigits[] = "0123456789abcdef";
+  for (const char c : rgba_png(1, 1, {255, 0, 0, 255})) {
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
+    uri += plain ? std::string(1, c) : std::string{'%', kDigits[uint8_t(c) >> 4], kDigits[uint8_t(c) & 15]};
+  }
+  const Mesh mesh = with_picture(uri);
+  EXPECT_EQ(mesh.color(0).base_color, kRed);
+  EXPECT_TRUE(mesh.notes.empty());
+}
+
+TEST_F(FileNames, UrisWithSchemesMachinesQueriesAndFragments) {
+  const std::string path = (folder_ / "Red%20Wall.PNG").string();
+  for (const char* start : {"file://", "FILE://", "file:", "file://localhost"}) {
+    const Mesh mesh = with_picture(start + path);
+    EXPECT_EQ(mesh.color(0).base_color, kRed) << start;
+    EXPECT_TRUE(mesh.notes.empty()) << start;
+  }
+  for (const char* uri : {"Red%20Wall.PNG?v=1", "Red%20Wall.PNG#part"}) {
+    EXPECT_EQ(with_picture(uri).color(0).base_color, kRed) << uri;
+    EXPECT_TRUE(has_note(with_picture(uri), "is no valid one")) << uri;
+  }
+  write("a?v=1", rgba_png(1, 1, {0, 255, 0, 255}));
+  EXPECT_EQ(with_picture("a?v=1").color(0).base_color, glm::vec3(0, 1, 0)) << "a file by the whole name";
 }
 
 TEST_F(FileNames, MaterialLibrariesAndTheirPicturesInAnyCaseAndInQuotes) {

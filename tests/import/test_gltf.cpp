@@ -64,6 +64,22 @@ TEST_F(Gltf, TheHeadersLengthEndsABinaryFileUnlessItIsWrong) {
   }
 }
 
+TEST_F(Gltf, ChunksThatAreNotReadAreNotedOnce) {
+  std::string more = triangle().glb();
+  for (const char* type : {"XYZ1", "XYZ1", "BIN"}) {
+    append(more, uint32_t{4});
+    more.append(type, 4);
+    more += "abcd";
+  }
+  const auto length = uint32_t(more.size());
+  std::memcpy(more.data() + 8, &length, sizeof length);
+  const Mesh mesh = MeshFiles::import("a.glb", more);
+  EXPECT_EQ(mesh.triangles.size(), 1u);
+  EXPECT_EQ(mesh.notes.size(), 2u);
+  EXPECT_TRUE(has_note(mesh, "chunks of the type XYZ1 are not read"));
+  EXPECT_TRUE(has_note(mesh, "more chunks of a kind"));
+}
+
 TEST_F(Gltf, UrisAsExportersWriteThem) {
   Document document = triangle();
   std::filesystem::create_directory(folder_ / "sub");
@@ -121,9 +137,10 @@ TEST_F(Gltf, WhatIsNotReadIsNotedOnce) {
   document.root["meshes"][0]["primitives"].push_back({{"attributes", attributes}});
   document.root["extensionsUsed"] = {"KHR_lights_punctual", "KHR_texture_transform"};
   document.root["animations"] = {json::object()};
+  document.root["cameras"] = {{{"type", "perspective"}}, {{"type", "perspective"}}};
   const Mesh mesh = import(document);
-  EXPECT_EQ(mesh.notes.size(), 4u);
-  for (const char* part : {"_HEAT", "COLOR_1", "KHR_lights_punctual", "animations"})
+  EXPECT_EQ(mesh.notes.size(), 5u);
+  for (const char* part : {"_HEAT", "COLOR_1", "KHR_lights_punctual", "animations", "cameras (2)"})
     EXPECT_TRUE(has_note(mesh, part)) << part;
   EXPECT_TRUE(import(triangle()).notes.empty());
 }
@@ -493,6 +510,32 @@ TEST_F(Gltf, AccessorsAndViewsOutsideTheirBuffers) {
   refused("accessors", "type", "MAT4");
   refused("nodes", "mesh", 5);
   refused("nodes", "children", json::array({9}));
+}
+
+TEST_F(Gltf, RefusalsNameTheAccessor) {
+  const auto message = [&](int accessor, const char* key, const json& value) {
+    Document document;
+    const int position = document.vec3(kTriangle);
+    const int indices = document.indices<uint16_t>({0, 1, 2}, kUshort);
+    document.node(
+        {{"mesh", document.mesh({{"attributes", {{"POSITION", position}}}, {"indices", indices}})}});
+    document.root["accessors"][size_t(accessor)][key] = value;
+    const Refusal refused = refusal(document);
+    EXPECT_EQ(refused.exit, Exit::kInvalid) << key << value;
+    return refused.message;
+  };
+  EXPECT_NE(message(0, "count", 4'000'000'000).find("accessor 0 reaches beyond"), std::string::npos)
+      << "and not that memory is short";
+  EXPECT_NE(message(1, "count", 4'000'000'000).find("accessor 1 reaches beyond"), std::string::npos);
+  EXPECT_NE(message(0, "type", "VEC2").find("accessor 0"), std::string::npos);
+  EXPECT_NE(message(1, "componentType", kFloat).find("accessor 1"), std::string::npos);
+  const auto sparse = [](int view, int count) {
+    return json{{"count", count},
+                {"indices", {{"bufferView", view}, {"componentType", kUshort}}},
+                {"values", {{"bufferView", 0}}}};
+  };
+  EXPECT_NE(message(0, "sparse", sparse(1, 4)).find("the sparse part of accessor 0 reaches"),
+            std::string::npos);
 }
 
 TEST_F(Gltf, WholeNumbersMayBeWrittenAsFloats) {

@@ -89,6 +89,14 @@ TEST_F(GltfAnimation, QuantisedRotationsAreRead) {
   expect_corner(at(2), 1, {-1, 0, 0});
 }
 
+// Bytes of which the second four are of length 0.71: half way is half the angle all the same.
+TEST_F(GltfAnimation, QuantisedRotationsCountByTheirDirection) {
+  const int output = document_.values<int8_t>({0, 0, 0, 127, 0, 0, 64, 64}, kByte, "VEC4", 4, true);
+  channel(0, "rotation", {0, 2}, output, "LINEAR");
+  const float h = std::sqrt(0.5f);
+  expect_corner(at(1), 1, {h, h, 0});
+}
+
 // Two seconds between the keys: 2 * 1/8 * 3 + 1/2 * 1 - 2 * 1/8 * -1 in the middle.
 TEST_F(GltfAnimation, CubicSplinesFollowTheirTangents) {
   channel(0, "translation", {1, 3}, document_.vec3({9, 9, 9, 0, 0, 0, 3, 0, 6, -1, 0, 0, 1, 0, 4, 9, 9, 9}),

@@ -440,7 +440,64 @@ TEST_F(GltfColor, VertexAlphaIsCoverageWhereTheMaterialBlends) {
   square.material()["alphaMode"] = "BLEND";
   EXPECT_NEAR(mean(import(square.document)).coverage, 0.5f, 1e-3f);
   square.material()["alphaMode"] = "MASK";
-  EXPECT_NEAR(mean(import(square.document)).coverage, 0.5f, 0.04f);
+  EXPECT_NEAR(mean(import(square.document)).coverage, 0.5f, 1e-6f);
+  square.material()["alphaCutoff"] = 0.25;
+  EXPECT_NEAR(mean(import(square.document)).coverage, 0.75f, 1e-6f);
+}
+
+// Alpha falls from 1 to 0 over the square; the cutoff of 0.25 is met where it is 0.5 times the texel's.
+TEST_F(GltfColor, VertexAlphaTimesATexelsMeetsTheCutoffAnywhereInIt) {
+  const auto coverage = [&](uint32_t size, std::vector<float> uv) {
+    Square square(std::move(uv));
+    square.attributes["COLOR_0"] =
+        square.document.values<float>({1, 1, 1, 1, 1, 1, 1, 0, 1, 1, 1, 0, 1, 1, 1, 1}, kFloat, "VEC4", 4);
+    std::vector<uint8_t> texels;
+    for (uint32_t i = 0; i < size * size; ++i) texels.insert(texels.end(), {255, 255, 255, 128});
+    square.base()["baseColorTexture"] = square.texture(rgba_png(size, size, texels));
+    square.material()["alphaMode"] = "MASK";
+    square.material()["alphaCutoff"] = 0.25 * 256 / 255;
+    return mean(import(square)).coverage;
+  };
+  for (const uint32_t size : {1u, 2u, 3u, 5u, 128u})
+    EXPECT_NEAR(coverage(size, {0, 0, 1, 0, 1, 1, 0, 1}), 0.5f, size < 128 && size > 1 ? 1e-5f : 0.01f)
+        << size;
+  EXPECT_NEAR(coverage(3, {0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5}), 0.5f, 0.01f) << "all on one texel";
+}
+
+// Where parts are missing, what is left has its own emission, whichever of the pictures is the finer one.
+TEST_F(GltfColor, EmissionWhereSomethingIsThere) {
+  const std::vector<uint8_t> left_there = {255, 255, 255, 255, 255, 255, 255, 0},
+                             right_glows = {0, 0, 0, 255, 255, 255, 255, 255};
+  // Columns of `pattern`, each repeated.
+  const auto wide = [](const std::vector<uint8_t>& pattern, uint32_t columns) {
+    std::vector<uint8_t> texels;
+    for (uint32_t i = 0; i < columns * columns; ++i) {
+      const size_t half = i % columns < columns / 2 ? 0 : 4;
+      texels.insert(texels.end(), pattern.begin() + half, pattern.begin() + half + 4);
+    }
+    return rgba_png(columns, columns, texels);
+  };
+  for (const auto& [base, glow] : {std::pair(2u, 16u), std::pair(16u, 2u), std::pair(8u, 8u)}) {
+    Square square;
+    square.base()["baseColorTexture"] = square.texture(wide(left_there, base));
+    square.material()["emissiveTexture"] = square.texture(wide(right_glows, glow));
+    square.material()["emissiveFactor"] = {1, 1, 1};
+    square.material()["alphaMode"] = "MASK";
+    Mesh mesh = import(square);
+    EXPECT_NEAR(mean(mesh).coverage, 0.5f, 1e-5f) << base;
+    EXPECT_NEAR(mean(mesh).emission.r, 0.0f, 1e-5f) << base;
+    square.material()["alphaMode"] = "BLEND";
+    EXPECT_NEAR(mean(import(square.document)).emission.r, 0.0f, 1e-5f) << base;
+    square.material()["alphaMode"] = "OPAQUE";
+    EXPECT_NEAR(mean(import(square.document)).emission.r, 0.5f, 1e-5f) << base;
+  }
+  Square glass;
+  glass.base()["baseColorFactor"] = {1, 1, 1, 0.5};
+  glass.base()["baseColorTexture"] = glass.texture(rgba_png(1, 1, {255, 255, 255, 255}));
+  glass.material()["emissiveTexture"] = glass.texture(wide(right_glows, 16));
+  glass.material()["emissiveFactor"] = {1, 1, 1};
+  glass.material()["alphaMode"] = "BLEND";
+  EXPECT_NEAR(mean(import(glass)).emission.r, 0.25f, 1e-5f) << "half of it lit, half of that there";
 }
 
 TEST_F(GltfColor, LargePicturesAndManyTilesKeepTheirMean) {

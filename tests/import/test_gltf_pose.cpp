@@ -92,6 +92,22 @@ TEST_F(GltfPose, JointsWithoutWeightsAreNoted) {
   EXPECT_TRUE(has_note(import(skinned.document), "joints without weights"));
 }
 
+TEST_F(GltfPose, SkinsWithoutJointsAndSetsWithoutThoseBeforeAreNoted) {
+  Skinned skinned({});
+  skinned.finish();
+  json& attributes = skinned.document.root["meshes"][0]["primitives"][0]["attributes"];
+  attributes["JOINTS_2"] = attributes["JOINTS_0"];
+  attributes["WEIGHTS_2"] = attributes["WEIGHTS_0"];
+  const Mesh gap = import(skinned.document);
+  EXPECT_TRUE(has_note(gap, "JOINTS_2 has no set before it"));
+  EXPECT_TRUE(has_note(gap, "WEIGHTS_2 has no set before it"));
+  EXPECT_EQ(corner(gap, 0, 1), glm::vec3(11, 4, 0));
+  for (const char* name : {"JOINTS_0", "WEIGHTS_0", "JOINTS_2", "WEIGHTS_2"}) attributes.erase(name);
+  const Mesh stiff = import(skinned.document);
+  EXPECT_TRUE(has_note(stiff, "a primitive without joints"));
+  EXPECT_EQ(corner(stiff, 0, 1), glm::vec3(107, 200, 300));
+}
+
 TEST_F(GltfPose, BrokenSkinsAreRefused) {
   Skinned skinned({});
   skinned.finish();

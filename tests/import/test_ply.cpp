@@ -39,6 +39,13 @@ TEST_F(Ply, NormalsAndStrips) {
   for (size_t t = 0; t < 3; ++t) EXPECT_GT(face_normal(mesh, t).z, 0.99f);
   EXPECT_EQ(mesh.normals[0][0], glm::vec3(0, 0, 1));
   EXPECT_EQ(mesh.normals[2][1], glm::vec3(0, 1, 0));
+  const Mesh unsigned_strips =
+      import("a.ply",
+             "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+             "element tristrips 1\nproperty list uchar uint vertex_indices\nend_header\n"
+             "0 0 0\n1 0 0\n0 1 0\n1 1 0\n7 0 1 2 4294967295 1 3 2\n");
+  EXPECT_EQ(unsigned_strips.triangles.size(), 2u);
+  EXPECT_EQ(unsigned_strips.primitive_count, 2u);
 }
 
 TEST_F(Ply, ColoursOfVerticesAndFaces) {

@@ -57,7 +57,7 @@ double shoelace(const Outline& outline) {
 }
 
 // Cuts the outline, either way round, and compares areas: the triangles' as they are turned, and their sizes.
-void expect_filled(const Outline& outline, const char* what) {
+void expect_filled(const Outline& outline, const char* what, double tolerance = 1e-9) {
   for (const bool backwards : {false, true}) {
     std::vector<glm::dvec3> corners;
     for (const glm::dvec2& p : outline) corners.push_back({0.25, p});
@@ -73,8 +73,8 @@ void expect_filled(const Outline& outline, const char* what) {
       sizes += std::abs(area);
     }
     const double want = std::abs(shoelace(outline));
-    EXPECT_NEAR(std::abs(sum), want, 1e-9 * want) << what;
-    EXPECT_NEAR(sizes, want, 1e-9 * want) << what << ": a triangle lies outside or twice";
+    EXPECT_NEAR(std::abs(sum), want, tolerance * want) << what;
+    EXPECT_NEAR(sizes, want, tolerance * want) << what << ": a triangle lies outside or twice";
   }
 }
 
@@ -164,6 +164,42 @@ TEST(Triangulate, OutlinesThatTouchThemselves) {
   expect_filled(repeated, "corners twice");
   const Outline hair = {{0, 0}, {2, 0}, {2, -3}, {2, 0}, {4, 0}, {4, 4}, {2, 1}, {0, 4}};
   expect_filled(hair, "a line there and back");
+}
+
+// Corners that lay on lines lie beside them by what rounds, on one side as seen from some and on the other as
+// seen from others.
+TEST(Triangulate, OutlinesOfCellsTurned) {
+  const Outline cells[] = {
+      {{0, 0}, {1, 0}, {1, 1}, {1, 2}, {1, 3}, {0, 3}, {-1, 3}, {-1, 2}, {0, 2}, {0, 1}},
+      {{0, 0}, {1, 0}, {2, 0}, {3, 0}, {3, 1}, {2, 1}, {2, 2}, {2, 3}, {1, 3}, {1, 2}, {1, 1}, {0, 1}},
+      {{0, 0}, {1, 0}, {1, 1}, {2, 1}, {2, 2}, {3, 2}, {3, 3}, {2, 3}, {1, 3}, {0, 3}, {0, 2}, {0, 1}},
+      {{0, 0}, {1, 0}, {2, 0}, {2, 1}, {1, 1}, {1, 2}, {2, 2}, {2, 3}, {1, 3}, {0, 3}, {0, 2}, {0, 1}}};
+  for (const Outline& outline : cells) {
+    for (int i = 0; i < 1000; ++i) {
+      const double c = std::cos(0.37 * i), s = std::sin(0.37 * i);
+      Outline turned;
+      for (const glm::dvec2& p : outline) turned.push_back({c * p.x - s * p.y, s * p.x + c * p.y});
+      expect_filled(turned, "cells");
+    }
+  }
+}
+
+// Corners on edges, which turned lie beyond them by what rounds.
+TEST(Triangulate, OutlinesThatTouchThemselvesTurned) {
+  const Outline outlines[] = {
+      {{0, 0}, {4, 0}, {4, 4}, {2, 0}, {0, 4}},
+      {{0, 0}, {6, 0}, {6, 4}, {5.5, 0}, {5, 4}, {4, 4}, {3.5, 0}, {3, 4}, {2, 4}, {1.5, 0}, {1, 4}, {0, 4}},
+      {{0, 0}, {3, 0}, {3, 1}, {1, 2}, {3, 2}, {3, 3}, {0, 3}, {0, 2}, {2, 1.5}, {0, 1}}};
+  for (const Outline& outline : outlines) {
+    for (int i = 0; i < 500; ++i) {
+      const double c = std::cos(0.37 * i), s = std::sin(0.37 * i);
+      Outline turned, single;
+      for (const glm::dvec2& p : outline) turned.push_back({c * p.x - s * p.y, s * p.x + c * p.y});
+      for (const glm::dvec2& p : turned) single.push_back(glm::dvec2(glm::vec2(p)));
+      expect_filled(turned, "corners on edges");
+      expect_filled(single, "corners on edges, in single precision", 1e-6);
+    }
+  }
 }
 
 // Rows of square holes in one outline, each over a bridge from the left.

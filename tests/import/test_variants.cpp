@@ -340,6 +340,17 @@ TEST_F(Variants, WordsThatAreNoNumbersAreNamed) {
   EXPECT_TRUE(has_note(import("a.obj", corners + "v 1.0D+00 0 0\nf 1 2 3\n"), "1.0D+00 and the like"));
 }
 
+TEST_F(Variants, NumbersTooSmallAreZeroAndTooLargeOnesAreRefused) {
+  const std::string small = "0." + std::string(400, '0') + "1", large = "1" + std::string(400, '0') + ".5";
+  for (const std::string& zero : {small, "-" + small, std::string("1e-400"), std::string("5.0E-999")}) {
+    const Mesh mesh = import("a.obj", "v 0 0 " + zero + "\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    EXPECT_EQ(mesh.triangles.size(), 1u) << zero;
+    EXPECT_EQ(corner(mesh, 0, 0), glm::vec3(0)) << zero;
+  }
+  for (const std::string& infinite : {large, std::string("1e400"), std::string("0.1E+999")})
+    EXPECT_EQ(refusal("a.obj", "v 0 0 " + infinite + "\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").exit, Exit::kInvalid);
+}
+
 TEST_F(Variants, CloudsOfPointsAreRefusedAsSuch) {
   for (const auto& [name, bytes] :
        {std::pair{"a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n"}, {"a.off", "OFF\n3 0 0\n0 0 0\n1 0 0\n0 1 0\n"}}) {
@@ -488,6 +499,11 @@ TEST_F(Variants, TextureCoordinatesThatAreNotFinite) {
       import("a.obj", "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt nan nan\nf 1/1 2/1 3/1\n");
   EXPECT_EQ(mesh.notes.size(), 1u);
   EXPECT_TRUE(has_note(mesh, "or no finite ones, its corner texel holds"));
+  const Mesh far = import("a.obj",
+                          "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1e20 0\nvt 0 1\n"
+                          "f 1/1 2/2 3/3\nf 1/1 2/2 3/1\n");
+  for (size_t t = 0; t < 2; ++t)
+    EXPECT_EQ(far.color(t).base_color, glm::vec3(0.5f, 0, 0.5f)) << "the mean of what it runs over so often";
 }
 
 TEST_F(Variants, OffTexturesBehindAColourAreNoAlpha) {

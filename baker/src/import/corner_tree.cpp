@@ -2,15 +2,47 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace lsp {
 
+namespace {
+
+// Adds `value` to an expansion, numbers of growing size without common bits whose sum is exact (Shewchuk
+// 1997). Returns its new length.
+int grow(double* expansion, int length, double value) {
+  int kept = 0;
+  for (int i = 0; i < length; ++i) {
+    const double sum = value + expansion[i], part = sum - value;
+    const double error = (value - (sum - part)) + (expansion[i] - part);
+    if (error != 0) expansion[kept++] = error;
+    value = sum;
+  }
+  expansion[kept++] = value;
+  return kept;
+}
+
+}  // namespace
+
 double area2(const glm::dvec2& a, const glm::dvec2& b, const glm::dvec2& c) {
-  const double bx = b.x - a.x, by = b.y - a.y, cx = c.x - a.x, cy = c.y - a.y;
-  const double left = bx * cy, right = by * cx, area = left - right;
+  const double left = (b.x - a.x) * (c.y - a.y), right = (b.y - a.y) * (c.x - a.x), area = left - right;
   constexpr double kRounding = 4e-16;
   if (std::abs(area) > kRounding * (std::abs(left) + std::abs(right))) return area;
-  return area + (std::fma(bx, cy, -left) - std::fma(by, cx, -right));
+  // a x b + b x c + c x a, without any rounding.
+  double expansion[12];
+  int length = 0;
+  const auto add = [&](double x, double y) {
+    const double product = x * y;
+    length = grow(expansion, length, std::fma(x, y, -product));
+    length = grow(expansion, length, product);
+  };
+  for (const auto& [p, q] : {std::pair(a, b), std::pair(b, c), std::pair(c, a)}) {
+    add(p.x, q.y);
+    add(-p.y, q.x);
+  }
+  double sum = 0;
+  for (int i = 0; i < length; ++i) sum += expansion[i];
+  return sum;
 }
 
 void CornerTree::build(std::span<const glm::dvec2> at) {

@@ -8,8 +8,8 @@
 
 namespace lsp {
 
-// Twice the signed area of a triangle. Its sign is right for these coordinates but for what their differences
-// round.
+// Twice the signed area of a triangle. Its sign is right for these coordinates, whatever rounds: were it not
+// the same for the same three corners in any order, ears that are none would be cut.
 double area2(const glm::dvec2& a, const glm::dvec2& b, const glm::dvec2& c);
 
 // Corners that are fixed in the plane and come and go: what is asked for is who is there in a triangle.

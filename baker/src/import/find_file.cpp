@@ -53,4 +53,9 @@ fs::path find_file(const fs::path& folder, std::string name, bool& guessed) {
   return {};
 }
 
+fs::path path_beside(const fs::path& folder, std::string name) {
+  std::replace(name.begin(), name.end(), '\\', '/');
+  return folder / name.substr(0, name.find('\0'));
+}
+
 }  // namespace lsp

@@ -11,4 +11,7 @@ namespace lsp {
 // is found where file systems do not mind. Empty where there is none.
 std::filesystem::path find_file(const std::filesystem::path& folder, std::string name, bool& guessed);
 
+// Where the file should be, for one that is not found.
+std::filesystem::path path_beside(const std::filesystem::path& folder, std::string name);
+
 }  // namespace lsp

@@ -196,6 +196,9 @@ class GltfReader {
     turned_.resize(primitive.normals.size());
     mirrored_.clear();
     bool mirrored = false;
+    if (skin >= 0 && !primitive.joints_each)
+      builder_.note(document_->file +
+                    ": a skin has a primitive without joints, which stands where its node puts it");
     if (skin >= 0 && primitive.joints_each) {
       place_by_joints(primitive, skins_.joint_matrices(skin));
     } else {

@@ -70,14 +70,16 @@ bool is_index_type(int type) {
          type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT;
 }
 
+std::string name_of(int accessor) { return "accessor " + std::to_string(accessor); }
+
 // `count` elements of `element` bytes, `stride` apart, from `offset`: the first one's address, once all of
-// them are known to lie inside `bytes`.
-const uint8_t* checked(const GltfDocument& document, Bytes bytes, uint64_t offset, uint64_t count,
-                       uint64_t element, uint64_t stride) {
+// them are known to lie inside `bytes`. `what` names them.
+const uint8_t* checked(const GltfDocument& document, const std::string& what, Bytes bytes, uint64_t offset,
+                       uint64_t count, uint64_t element, uint64_t stride) {
   const uint64_t room = bytes.size();
   if (count == 0) return bytes.data();
   if (offset > room || element > room - offset || count - 1 > (room - offset - element) / stride) {
-    fail(document, "is cut short or has an accessor that reaches beyond its buffer");
+    fail(document, "is cut short, or " + what + " reaches beyond its buffer");
   }
   return bytes.data() + offset;
 }
@@ -166,16 +168,15 @@ std::vector<float> GltfAccessors::floats(int index, int components) {
                                       : components;
   if (accessor.type != shape || component == 0 ||
       accessor.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT) {
-    fail(document_, "has vertex attributes or keys of a type glTF does not permit for them");
+    fail(document_,
+         "has vertex attributes or keys of a type glTF does not permit for them, " + name_of(index));
   }
+  const uint64_t element = component * uint64_t(components);
+  uint64_t stride = 0;
+  const uint8_t* from = elements(index, element, stride);
   budget_.charge(document_.file, accessor.count, uint64_t(components) * sizeof(float));
   std::vector<float> values(accessor.count * size_t(components), 0.0f);
-  if (accessor.bufferView >= 0) {
-    const uint64_t element = component * uint64_t(components);
-    const Bytes bytes = view(accessor.bufferView);
-    const size_t declared = document_.model.bufferViews[size_t(accessor.bufferView)].byteStride;
-    const uint64_t stride = declared ? declared : element;
-    const uint8_t* from = checked(document_, bytes, accessor.byteOffset, accessor.count, element, stride);
+  if (from) {
     for (size_t i = 0; i < accessor.count; ++i) {
       for (int k = 0; k < components; ++k) {
         values[i * size_t(components) + size_t(k)] = load_float(from + i * stride + size_t(k) * component,
@@ -183,71 +184,74 @@ std::vector<float> GltfAccessors::floats(int index, int components) {
       }
     }
   }
-  overlay_sparse(accessor, components, values);
+  overlay_sparse(index, components, values);
   return values;
 }
 
-void GltfAccessors::overlay_sparse(const tinygltf::Accessor& accessor, int components,
-                                   std::vector<float>& values) {
-  if (!accessor.sparse.isSparse) return;
+// Where the accessor's elements of `element` bytes begin, and how far apart they are, once all are known to
+// be there; null where it has no buffer view.
+const uint8_t* GltfAccessors::elements(int index, uint64_t element, uint64_t& stride) {
+  const tinygltf::Accessor& accessor = at(index);
+  if (accessor.bufferView < 0) return nullptr;
+  const Bytes bytes = view(accessor.bufferView);
+  const size_t declared = document_.model.bufferViews[size_t(accessor.bufferView)].byteStride;
+  stride = declared ? declared : element;
+  return checked(document_, name_of(index), bytes, accessor.byteOffset, accessor.count, element, stride);
+}
+
+// Calls set(number of an element, its bytes) for an accessor's sparse elements of `element` bytes.
+template <typename Set>
+void GltfAccessors::for_each_sparse(int index, uint64_t element, const Set& set) {
+  const tinygltf::Accessor& accessor = at(index);
   const auto& sparse = accessor.sparse;
+  if (!sparse.isSparse) return;
+  const std::string name = "the sparse part of " + name_of(index);
   if (sparse.count < 0 || !is_index_type(sparse.indices.componentType) || sparse.indices.byteOffset < 0 ||
       sparse.values.byteOffset < 0) {
-    fail(document_, "has sparse values that glTF does not permit");
+    fail(document_, "has sparse values that glTF does not permit, " + name);
   }
   const auto count = uint64_t(sparse.count);
-  const size_t component = size_of(accessor.componentType),
-               index_bytes = size_of(sparse.indices.componentType);
-  const uint64_t element = component * uint64_t(components);
-  const uint8_t* index = checked(document_, view(sparse.indices.bufferView),
-                                 uint64_t(sparse.indices.byteOffset), count, index_bytes, index_bytes);
-  const uint8_t* value = checked(document_, view(sparse.values.bufferView),
-                                 uint64_t(sparse.values.byteOffset), count, element, element);
+  const size_t index_bytes = size_of(sparse.indices.componentType);
+  const uint8_t* numbers = checked(document_, name, view(sparse.indices.bufferView),
+                                   uint64_t(sparse.indices.byteOffset), count, index_bytes, index_bytes);
+  const uint8_t* values = checked(document_, name, view(sparse.values.bufferView),
+                                  uint64_t(sparse.values.byteOffset), count, element, element);
   for (uint64_t i = 0; i < count; ++i) {
-    const uint64_t at = load_index(index + i * index_bytes, sparse.indices.componentType);
-    if (at >= values.size() / size_t(components))
-      fail(document_, "has a sparse value for an element that is not there");
-    for (int k = 0; k < components; ++k) {
-      values[at * size_t(components) + size_t(k)] = load_float(value + i * element + size_t(k) * component,
-                                                               accessor.componentType, accessor.normalized);
-    }
+    const uint64_t number = load_index(numbers + i * index_bytes, sparse.indices.componentType);
+    if (number >= accessor.count)
+      fail(document_,
+           "has a value for element " + std::to_string(number) + ", which is not there, in " + name);
+    set(number, values + i * element);
   }
+}
+
+void GltfAccessors::overlay_sparse(int index, int components, std::vector<float>& values) {
+  const tinygltf::Accessor& accessor = at(index);
+  const size_t component = size_of(accessor.componentType);
+  for_each_sparse(index, component * uint64_t(components), [&](uint64_t number, const uint8_t* value) {
+    const uint64_t first = number * uint64_t(components);
+    if (first + uint64_t(components) > values.size())
+      fail(document_, "has more values in " + name_of(index) + " than its compressed data hold");
+    for (uint64_t k = 0; k < uint64_t(components); ++k)
+      values[first + k] = load_float(value + k * component, accessor.componentType, accessor.normalized);
+  });
 }
 
 std::vector<uint32_t> GltfAccessors::indices(int index) {
   const tinygltf::Accessor& accessor = at(index);
   const size_t component = size_of(accessor.componentType);
   if (accessor.type != TINYGLTF_TYPE_SCALAR || !is_index_type(accessor.componentType)) {
-    fail(document_, "has indices of a type glTF does not permit for them");
+    fail(document_, "has indices of a type glTF does not permit for them, " + name_of(index));
   }
+  uint64_t stride = 0;
+  const uint8_t* from = elements(index, component, stride);
   budget_.charge(document_.file, accessor.count, sizeof(uint32_t));
   std::vector<uint32_t> values(accessor.count, 0);
-  if (accessor.bufferView >= 0) {
-    const Bytes bytes = view(accessor.bufferView);
-    const size_t declared = document_.model.bufferViews[size_t(accessor.bufferView)].byteStride;
-    const uint64_t stride = declared ? declared : component;
-    const uint8_t* from = checked(document_, bytes, accessor.byteOffset, accessor.count, component, stride);
-    for (size_t i = 0; i < accessor.count; ++i)
-      values[i] = load_index(from + i * stride, accessor.componentType);
-  }
-  if (accessor.sparse.isSparse) {
-    const auto& sparse = accessor.sparse;
-    if (sparse.count < 0 || !is_index_type(sparse.indices.componentType) || sparse.indices.byteOffset < 0 ||
-        sparse.values.byteOffset < 0) {
-      fail(document_, "has sparse values that glTF does not permit");
-    }
-    const auto count = uint64_t(sparse.count);
-    const size_t index_bytes = size_of(sparse.indices.componentType);
-    const uint8_t* at = checked(document_, view(sparse.indices.bufferView),
-                                uint64_t(sparse.indices.byteOffset), count, index_bytes, index_bytes);
-    const uint8_t* value = checked(document_, view(sparse.values.bufferView),
-                                   uint64_t(sparse.values.byteOffset), count, component, component);
-    for (uint64_t i = 0; i < count; ++i) {
-      const uint64_t element = load_index(at + i * index_bytes, sparse.indices.componentType);
-      if (element >= values.size()) fail(document_, "has a sparse value for an element that is not there");
-      values[element] = load_index(value + i * component, accessor.componentType);
-    }
-  }
+  for (size_t i = 0; i < accessor.count && from; ++i)
+    values[i] = load_index(from + i * stride, accessor.componentType);
+  for_each_sparse(index, component, [&](uint64_t number, const uint8_t* value) {
+    values[number] = load_index(value, accessor.componentType);
+  });
   return values;
 }
 

@@ -24,13 +24,16 @@ class GltfAccessors {
   std::vector<uint32_t> indices(int accessor);
 
   // Lays the accessor's sparse values, if it has any, over `values` (count * components floats).
-  void overlay_sparse(const tinygltf::Accessor& accessor, int components, std::vector<float>& values);
+  void overlay_sparse(int accessor, int components, std::vector<float>& values);
 
   // The bytes of a buffer view, decompressed where EXT_meshopt_compression says so. kUnsupported where that
   // fails; kInvalid where they lie outside the buffer.
   Bytes view(int buffer_view);
 
  private:
+  const uint8_t* elements(int accessor, uint64_t element, uint64_t& stride);
+  template <typename Set>
+  void for_each_sparse(int accessor, uint64_t element, const Set& set);
   Bytes decode_meshopt(int buffer_view, const tinygltf::Value& extension);
   Bytes buffer_range(int buffer, uint64_t offset, uint64_t length) const;
 

@@ -31,16 +31,17 @@ std::string in_words(const json& animations, size_t i) {
 
 double dot(const double* a, const double* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]; }
 
-// Between two rotations on the shorter way; what is left from a unit length gltf_matrix takes out.
+// Between two rotations on the shorter way. Quantised ones are not of unit length, and of different ones.
 std::vector<double> slerp(const double* from, const double* to, double u) {
-  const double lengths = std::sqrt(dot(from, from) * dot(to, to));
-  const double cosine = lengths > 0 ? dot(from, to) / lengths : 1;
+  const double of_from = std::sqrt(dot(from, from)), of_to = std::sqrt(dot(to, to));
+  const double cosine = of_from * of_to > 0 ? dot(from, to) / (of_from * of_to) : 1;
   const double angle = std::acos(std::min(std::abs(cosine), 1.0)), sine = std::sin(angle);
   const bool near = sine < 1e-9;
   const double a = near ? 1 - u : std::sin((1 - u) * angle) / sine;
   const double b = std::copysign(near ? u : std::sin(u * angle) / sine, cosine);
   std::vector<double> out;
-  for (int k = 0; k < 4; ++k) out.push_back(a * from[k] + b * to[k]);
+  for (int k = 0; k < 4; ++k)
+    out.push_back((of_from > 0 ? a * from[k] / of_from : 0) + (of_to > 0 ? b * to[k] / of_to : 0));
   return out;
 }
 

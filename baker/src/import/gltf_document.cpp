@@ -62,6 +62,14 @@ Container open_container(const std::string& file, std::string_view bytes, std::v
       container.text = body;
     } else if (type == kBin && !container.binary.data()) {
       container.binary = {reinterpret_cast<const uint8_t*>(body.data()), body.size()};
+    } else {
+      const std::string note =
+          type == kBin || type == kJson
+              ? "it has more chunks of a kind than are read"
+              : "chunks of the type " + printable(bytes.substr(at + 4, 4)) + " are not read";
+      constexpr size_t kMost = 20;
+      if (notes.size() < kMost && std::find(notes.begin(), notes.end(), note) == notes.end())
+        notes.push_back(note);
     }
     at += 8 + size_t{length};
     wrong = wrong || at > declared;

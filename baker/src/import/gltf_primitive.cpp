@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "import/text.h"
 #include "lsp/program.h"
 
 namespace lsp {
@@ -169,7 +170,7 @@ GltfPrimitives::Values GltfPrimitives::read_values(const tinygltf::Primitive& so
   const GltfDraco::Decoded* decoded = draco_.find(source);
   if (decoded && decoded->values.contains(name)) {
     out.floats = decoded->values.at(name);
-    accessors_.overlay_sparse(accessors_.at(found->second), out.components, out.floats);
+    accessors_.overlay_sparse(found->second, out.components, out.floats);
   } else if (!decoded || accessors_.at(found->second).bufferView >= 0 || !GltfDraco::names(source, name)) {
     out.floats = accessors_.floats(found->second, out.components);
   }
@@ -282,6 +283,13 @@ void GltfPrimitives::read_joints(const tinygltf::Primitive& source, GltfPrimitiv
       fail("has more or fewer joints or weights than positions");
     joints.push_back(std::move(joint.floats));
     weights.push_back(std::move(weight.floats));
+  }
+  for (const auto& [name, accessor] : source.attributes) {
+    const size_t number = name.find('_') + 1;
+    int64_t set = 0;
+    if ((name.starts_with("JOINTS_") || name.starts_with("WEIGHTS_")) &&
+        !(integer_of(std::string_view(name).substr(number), set) && set <= int64_t(joints.size())))
+      builder_.note(document_.file + ": " + name + " has no set before it and is not read");
   }
   if (joints.empty()) return;
   out.joints_each = 4 * joints.size();

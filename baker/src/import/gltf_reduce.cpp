@@ -148,8 +148,9 @@ void make_integers(const std::string& file, std::string_view key, json& value) {
   } else if (value.is_array()) {
     for (json& item : value) make_integers(file, key, item);
   } else if (is_integer_key(key) &&
-             !(key == "mode" && value.is_string())) {  // EXT_meshopt_compression's is text
-    constexpr double kLargest = 9007199254740992.0;    // 2^53: beyond, doubles skip integers
+             !(key == "mode" && (value == "ATTRIBUTES" || value == "TRIANGLES" ||
+                                 value == "INDICES"))) {  // EXT_meshopt_compression's is text
+    constexpr double kLargest = 9007199254740992.0;       // 2^53: beyond, doubles skip integers
     if (value.is_number_float()) {
       const auto number = value.get<double>();
       if (number >= 0 && number <= kLargest && number == std::floor(number)) value = uint64_t(number);
@@ -239,6 +240,8 @@ std::vector<std::string> unread_parts(const json& document) {
     for (const json& node : nodes) collect_unread(node, of_nodes);
     parts.insert(parts.end(), of_nodes.begin(), of_nodes.end());
   }
+  if (const size_t cameras = member(document, "cameras").size(); cameras > 0)
+    parts.push_back("its cameras (" + std::to_string(cameras) + ") are not read");
   if (member(document, "scenes").size() > 1 && !member(document, "scene").is_null()) {
     parts.push_back("only the default one of its scenes is read");
   } else if (member(document, "scenes").size() > 1) {

@@ -102,6 +102,7 @@ std::string GltfTextures::picture_bytes(const json& image) {
     if (is_data_uri(uri)) return decode_data_uri(document_.file, uri);
     std::string remark;
     const std::filesystem::path path = resolve_uri(path_, uri, remark);
+    if (std::error_code error; !std::filesystem::is_regular_file(path, error)) builder_.add_missing(path);
     std::string bytes = read_file(path, builder_.budget());
     builder_.budget().release(bytes.size());
     builder_.add_source(path);

@@ -95,6 +95,8 @@ std::array<uint64_t, 2> hash_sources(const Mesh& mesh) {
   XXH3_128bits_reset(state.get());
   for (const auto& files : mesh.sources) {
     for (const std::filesystem::path& path : files) {
+      std::error_code error;
+      if (path != files[0] && !std::filesystem::is_regular_file(path, error)) continue;
       Budget budget(0);
       const std::string bytes = read_file(path, budget);
       XXH3_128bits_update(state.get(), bytes.data(), bytes.size());

@@ -43,8 +43,8 @@ struct ImportOptions {
 // required extension, by name), kLimit (memory, or more than 2^32 - 2 triangles).
 Mesh import_meshes(std::span<const std::filesystem::path> inputs, const ImportOptions& options);
 
-// The hash that names a mesh's sources: XXH3-128 (seed 0) of the concatenation of the bytes of all of them in
-// order. Returns {low, high} 64 bits. Throws Failure kFile where a file cannot be read.
+// The hash that names a mesh's sources: XXH3-128 (seed 0) of the concatenation of the bytes of all of them
+// that are there, in order. Returns {low, high} 64 bits. Throws Failure kFile where a file cannot be read.
 std::array<uint64_t, 2> hash_sources(const Mesh& mesh);
 
 }  // namespace lsp

@@ -61,6 +61,12 @@ void MeshBuilder::add_source(const std::filesystem::path& path) {
   list.push_back(path);
 }
 
+// A file can name as many as it has lines.
+void MeshBuilder::add_missing(const std::filesystem::path& path) {
+  constexpr size_t kMost = 100, kLongest = 1000;
+  if (mesh_.sources.back().size() < kMost && path.native().size() < kLongest) add_source(path);
+}
+
 void MeshBuilder::begin(const std::string& file, std::span<const glm::dvec3> positions,
                         uint64_t triangle_count, MissingNormals missing) {
   check_count(file, triangle_count);

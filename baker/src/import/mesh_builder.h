@@ -31,9 +31,11 @@ class MeshBuilder {
  public:
   MeshBuilder(Budget& budget, float crease_angle_degrees);
 
-  // Starts an input file; `add_source` names a further one that it led to.
+  // Starts an input file; `add_source` names a further one that it led to, `add_missing` one that it would
+  // have led to were it there.
   void begin_input(const std::filesystem::path& path) { mesh_.sources.push_back({path}); }
   void add_source(const std::filesystem::path& path);
+  void add_missing(const std::filesystem::path& path);
 
   // Starts a group of triangles that index `positions` (which must outlive the group); `file` names it in
   // errors and notes, `triangle_count` is what it will add (charged to the budget at once).

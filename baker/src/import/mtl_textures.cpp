@@ -104,7 +104,9 @@ Picture MtlTextures::read(const MtlMaterial& source, const MtlMap& map) {
     path = find_file(folder, map.file, guessed);  // some exporters name what lies beside the mesh
     guessed = true;
   }
-  if (!path.empty()) {
+  if (path.empty()) {
+    builder_.add_missing(path_beside(source.folder, map.file));
+  } else {
     if (guessed) builder_.note(file_ + ": the picture " + map.file + " is read from " + path.string());
     const std::string bytes = read_file(path, builder_.budget());
     builder_.add_source(path);

@@ -261,6 +261,7 @@ class ObjReader {
     while (take_word(rest, word) && !word.starts_with('#')) {
       if (!try_library(std::string(unquoted(word)), materials)) {
         builder_.note(file_ + ": the material library " + std::string(word) + " is not there");
+        builder_.add_missing(path_beside(path_.parent_path(), std::string(unquoted(word))));
       }
     }
   }

@@ -301,7 +301,8 @@ class PlyReader {
     strip.clear();
     for (uint64_t c = 0; c < length; ++c) {
       const int64_t index = body_.index(property.type);
-      if (strips && index < 0) {
+      // A strip ends with -1, whose bits unsigned types have, too.
+      if (strips && (index < 0 || (property.type == Type::kUint32 && index == int64_t{kNoIndex}))) {
         end_strip(strip);
         continue;
       }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "import/rounding.h"
+#include "import/touching.h"
 #include "lsp/program.h"
 
 namespace lsp {
@@ -111,7 +112,19 @@ EarCut triangulate(std::span<const glm::dvec3> corners, std::vector<glm::uvec3>&
     fan(ring, out);
     return EarCut::kRight;
   }
-  return clipper.cut(flat, out, work);
+  const size_t first = out.size();
+  const EarCut cut = clipper.cut(flat, out, work);
+  constexpr size_t kMostCorners = 2'000;  // all are compared with all
+  const uint64_t steps = corners.size() * corners.size() / 4;
+  if (cut != EarCut::kCrossed || corners.size() > kMostCorners || steps >= work) return cut;
+  work -= steps;
+  if (!part_touching(flat)) return cut;
+  static thread_local std::vector<glm::uvec3> parted;
+  parted.clear();
+  if (clipper.cut(flat, parted, work) != EarCut::kRight) return cut;
+  out.resize(first);
+  out.insert(out.end(), parted.begin(), parted.end());
+  return EarCut::kRight;
 }
 
 namespace {

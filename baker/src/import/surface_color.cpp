@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace lsp {
 namespace {
@@ -17,6 +18,22 @@ struct Cut {
   glm::dvec2 corners[8];
   int count = 0;
 };
+
+// The part where `height`, which must be linear, is at least 0.
+template <typename Height>
+Cut clip(const Cut& from, const Height& height) {
+  Cut out;
+  double heights[8];
+  for (int i = 0; i < from.count; ++i) heights[i] = height(from.corners[i]);
+  for (int i = 0; i < from.count; ++i) {
+    const int next = (i + 1) % from.count;
+    const double a = heights[i], b = heights[next];
+    if (a >= 0 && out.count < 8) out.corners[out.count++] = from.corners[i];
+    if ((a >= 0) != (b >= 0) && out.count < 8)
+      out.corners[out.count++] = from.corners[i] + (from.corners[next] - from.corners[i]) * (a / (a - b));
+  }
+  return out;
+}
 
 // The part where the coordinate on `axis` is at least `bound` (or at most, with `below`).
 Cut clip(const Cut& from, int axis, double bound, bool below) {
@@ -75,8 +92,8 @@ class Footprint {
     const glm::dvec2 extent = glm::max(at_[0], glm::max(at_[1], at_[2])) - low;
     longest_ = std::max(extent.x, extent.y);
     area_ = std::abs(cross(at_[1] - at_[0], at_[2] - at_[0])) / 2;
-    usable_ =
-        std::isfinite(area_) && std::isfinite(longest_) && std::abs(low.x) < 1e12 && std::abs(low.y) < 1e12;
+    constexpr double kMost = 1e12;  // so that places fit into whole numbers
+    usable_ = std::isfinite(area_) && longest_ < kMost && std::abs(low.x) < kMost && std::abs(low.y) < kMost;
     small_ = !(area_ >= 1) && (!use.nearest || area_ < 1e-9);
     while (!small_ && level_ + 1 < use.texture->levels() && !fits(most_texels)) ++level_;
     if (!small_ && !fits(most_texels)) usable_ = false;
@@ -85,20 +102,26 @@ class Footprint {
   // The level whose texels visit() looks at.
   size_t level() const { return usable_ ? small_ ? 0 : level_ : use_.texture->levels() - 1; }
 
+  // In how many pieces visit() takes the triangle, about.
+  double pieces() const { return !usable_ || small_ ? 1 : area_ / (steps().x * steps().y); }
+
   // Calls visit(share of the area, weights, texel) for the pieces of the triangle. `alpha`, where there is
-  // one, gives the vertices' at a place: then the finest level alone is right.
+  // one, gives the vertices' at a place, linear, for a mask: then the finest level alone is right.
   template <typename Alpha, typename Visit>
   void visit(const Alpha& alpha, const Visit& visit) const {
     const Texture& texture = *use_.texture;
     if (!usable_) return visit(1.0, Weights(1.0 / 3), texture.texel(level(), 0, 0, use_.wrap_x, use_.wrap_y));
+    if (alpha && (small_ || level_ > 0)) {
+      const int n = small_ ? 24 : 64;
+      for_each_part(n, [&](const Weights& w) { visit(1.0 / (n * n), w, texel_times(alpha(w), w)); });
+      return;
+    }
     if (small_) {
       const int n = std::clamp(int(std::ceil(std::min(longest_, 1e6) * 2)), 3, 24);
       for_each_part(n, [&](const Weights& w) { visit(1.0 / (n * n), w, sample(w)); });
       return;
     }
-    const Texture::Size fine = texture.size(0), size = texture.size(level_);
-    const glm::dvec2 scale(double(size.width) / fine.width, double(size.height) / fine.height);
-    Cut whole{{at_[0] * scale, at_[1] * scale, at_[2] * scale}, 3};
+    Cut whole{{at_[0] / steps(), at_[1] / steps(), at_[2] / steps()}, 3};
     const glm::dvec2 a = whole.corners[0], ab = whole.corners[1] - a, ac = whole.corners[2] - a;
     const double doubled = cross(ab, ac);
     const auto weights_of = [&](const glm::dvec2& p) {
@@ -116,35 +139,60 @@ class Footprint {
       Cut row = clip(whole, 1, y + 1, true);
       whole = clip(whole, 1, y + 1, false);
       for (double x = std::floor(range(row, 0).first); row.count > 2; ++x) {
-        const Cut piece = clip(row, 0, x + 1, true);
+        Cut piece = clip(row, 0, x + 1, true);
         row = clip(row, 0, x + 1, false);
+        const auto i = int64_t(x), j = int64_t(y);
+        if (alpha) {
+          const float least = texture.least_alpha(i, j, use_.wrap_x, use_.wrap_y);
+          piece = clip(piece, [&](const glm::dvec2& p) { return double(alpha(weights_of(p)) - least); });
+        }
         glm::dvec2 centroid;
         const double area = measure(piece, centroid);
         if (!(area > 0)) continue;
-        const Weights w = weights_of(centroid);
-        const auto i = int64_t(x), j = int64_t(y);
-        visit(area / (std::abs(doubled) / 2), w,
-              alpha && level_ == 0 ? texture.texel_times(alpha(w), i, j, use_.wrap_x, use_.wrap_y)
-                                   : texture.texel(level_, i, j, use_.wrap_x, use_.wrap_y));
+        visit(area / (std::abs(doubled) / 2), weights_of(centroid),
+              alpha ? texture.texel_times(kSolid, i, j, use_.wrap_x, use_.wrap_y)
+                    : texture.texel(level_, i, j, use_.wrap_x, use_.wrap_y));
       }
     }
   }
 
-  // The finest level at a place.
+  // What visit() sees at a place.
+  template <typename Alpha>
+  glm::vec4 look_at(const Weights& w, const Alpha& alpha) const {
+    if (!usable_) return use_.texture->texel(level(), 0, 0, use_.wrap_x, use_.wrap_y);
+    if (alpha) return texel_times(alpha(w), w);
+    if (small_) return sample(w);
+    const glm::dvec2 at = place(w) / steps();
+    return use_.texture->texel(level_, int64_t(std::floor(at.x)), int64_t(std::floor(at.y)), use_.wrap_x,
+                               use_.wrap_y);
+  }
+
+ private:
+  static constexpr float kSolid = 1e30f;  // a vertex's alpha that passes every test that one can pass
+
+  // Texels of the finest level that one of the level has on either axis.
+  glm::dvec2 steps() const {
+    const Texture::Size fine = use_.texture->size(0), size = use_.texture->size(level_);
+    return {double(fine.width) / size.width, double(fine.height) / size.height};
+  }
+  bool fits(double most_texels) const {
+    const glm::dvec2 step = steps();
+    return area_ / (step.x * step.y) <= most_texels && longest_ / std::min(step.x, step.y) <= 8 * most_texels;
+  }
+  glm::dvec2 place(const Weights& w) const {
+    return at_[0] + w.x * (at_[1] - at_[0]) + w.y * (at_[2] - at_[0]);
+  }
   glm::vec4 sample(const Weights& w) const {
-    const glm::dvec2 at = at_[0] + w.x * (at_[1] - at_[0]) + w.y * (at_[2] - at_[0]);
-    if (!usable_ || !std::isfinite(at.x) || !std::isfinite(at.y)) return glm::vec4(0, 0, 0, 1);
+    const glm::dvec2 at = place(w);
     if (use_.nearest)
       return use_.texture->texel(0, int64_t(std::floor(at.x)), int64_t(std::floor(at.y)), use_.wrap_x,
                                  use_.wrap_y);
     return use_.texture->bilinear(at, use_.wrap_x, use_.wrap_y);
   }
-
- private:
-  bool fits(double most_texels) const {
-    const Texture::Size fine = use_.texture->size(0), size = use_.texture->size(level_);
-    const double x = double(size.width) / fine.width, y = double(size.height) / fine.height;
-    return area_ * x * y <= most_texels && longest_ * std::max(x, y) <= 8 * most_texels;
+  glm::vec4 texel_times(float alpha, const Weights& w) const {
+    const glm::dvec2 at = place(w);
+    return use_.texture->texel_times(alpha, int64_t(std::floor(at.x)), int64_t(std::floor(at.y)), use_.wrap_x,
+                                     use_.wrap_y);
   }
 
   const TextureUse& use_;
@@ -166,25 +214,19 @@ class Mean {
   }
 
   TriangleColor color() {
-    const glm::dvec2 glow_uv[3] = {corners_[0].glow_uv, corners_[1].glow_uv, corners_[2].glow_uv};
-    const bool glows = surface_.glow.texture != nullptr && surface_.emission != glm::vec3(0);
-    std::unique_ptr<Footprint> glow;
-    if (glows) glow = std::make_unique<Footprint>(surface_.glow, glow_uv, most_texels_);
-    // Where parts are missing, only what the others emit counts.
-    const bool together = glows && surface_.base.texture && surface_.alpha.mode != AlphaMode::kOpaque;
-    add_base(together ? glow.get() : nullptr);
-    if (glows && !together) {
-      const std::function<float(Weights)> no_alpha;
-      glow->visit(no_alpha, [&](double share, const Weights&, const glm::vec4& texel) {
-        glow_ += share * glm::dvec3(texel);
-      });
-    }
+    const auto lay = [&](const TextureUse& use, glm::dvec2 SurfaceCorner::*uv, std::optional<Footprint>& to) {
+      const glm::dvec2 at[3] = {corners_[0].*uv, corners_[1].*uv, corners_[2].*uv};
+      if (use.texture) to.emplace(use, at, most_texels_);
+    };
+    lay(surface_.base, &SurfaceCorner::base_uv, base_);
+    if (surface_.emission != glm::vec3(0)) lay(surface_.glow, &SurfaceCorner::glow_uv, glow_);
+    add_base();
     TriangleColor out;
     out.coverage = float(std::min(1.0, coverage_));
     if (coverage_ < kNothing) return {surface_.base_color, glm::vec3(0), 0.0f};
-    out.base_color = glm::clamp(surface_.base_color * glm::vec3(base_ / coverage_), 0.0f, 1.0f);
+    out.base_color = glm::clamp(surface_.base_color * glm::vec3(color_ / coverage_), 0.0f, 1.0f);
     out.emission = surface_.emission;
-    if (glows) out.emission *= glm::vec3(together ? glow_ / coverage_ : glow_);
+    if (glow_) out.emission *= glm::vec3(mean_glow());
     return out;
   }
 
@@ -193,37 +235,77 @@ class Mean {
     return corners_[0].color * float(1 - w.x - w.y) + corners_[1].color * float(w.x) +
            corners_[2].color * float(w.y);
   }
+  // Whether vertices say how much is there, by a threshold or as a factor.
+  bool is_masked() const { return !solid_ && surface_.alpha.mode == AlphaMode::kMask; }
+  bool is_blended() const { return !solid_ && surface_.alpha.mode == AlphaMode::kBlend; }
+  std::function<float(Weights)> mask() const {
+    if (!is_masked()) return nullptr;
+    return [this](const Weights& w) { return vertex_color(w).a; };
+  }
 
-  void add_base(const Footprint* glow) {
-    const bool by_vertex = !solid_ && surface_.alpha.mode != AlphaMode::kOpaque;
-    std::function<float(Weights)> alpha;
-    if (by_vertex && surface_.alpha.mode == AlphaMode::kMask)
-      alpha = [&](const Weights& w) { return vertex_color(w).a; };
+  void add_base() {
     const auto add = [&](double share, const Weights& w, glm::vec4 texel) {
       const glm::vec4 color = plain_ ? glm::vec4(1) : vertex_color(w);
-      if (by_vertex && !alpha) texel *= color.a;
-      base_ += share * glm::dvec3(texel * color);
+      if (is_blended()) texel *= color.a;
+      color_ += share * glm::dvec3(texel * color);
       coverage_ += share * double(texel.a);
-      if (glow) glow_ += share * double(texel.a) * glm::dvec3(glow->sample(w));
     };
-    if (surface_.base.texture) {
-      const glm::dvec2 uv[3] = {corners_[0].base_uv, corners_[1].base_uv, corners_[2].base_uv};
-      Footprint(surface_.base, uv, most_texels_).visit(alpha, add);
-    } else if (by_vertex) {
+    if (base_) {
+      base_->visit(mask(), add);
+    } else if (is_masked()) {
+      const double least = double(surface_.alpha.least(1));
+      const Cut whole{{glm::dvec2(0, 0), glm::dvec2(1, 0), glm::dvec2(0, 1)}, 3};
+      glm::dvec2 centroid;
+      const double area =
+          measure(clip(whole, [&](const Weights& w) { return double(vertex_color(w).a) - least; }), centroid);
+      if (area > 0) add(2 * area, centroid, glm::vec4(1 - surface_.alpha.glass));
+    } else if (is_blended()) {
       constexpr int kParts = 16;
       for_each_part(kParts, [&](const Weights& w) {
-        add(1.0 / (kParts * kParts), w, glm::vec4(surface_.alpha.coverage(alpha ? alpha(w) : 1.0f)));
+        add(1.0 / (kParts * kParts), w, glm::vec4(surface_.alpha.coverage(1)));
       });
     } else {
       add(1, Weights(1.0 / 3), glm::vec4(surface_.alpha.coverage(1)));
     }
   }
 
+  // How much is there at a place.
+  double coverage_at(const Weights& w) const {
+    const float alpha = vertex_color(w).a;
+    const float there =
+        base_ ? base_->look_at(w, mask()).a : surface_.alpha.coverage(is_masked() ? alpha : 1);
+    return double(is_blended() ? there * alpha : there);
+  }
+
+  // The mean of the emission texture where something is there, walking over the finer of both textures.
+  glm::dvec3 mean_glow() const {
+    const std::function<float(Weights)> no_alpha;
+    const bool whole = surface_.alpha.mode == AlphaMode::kOpaque || (!base_ && solid_);
+    glm::dvec3 glow(0);
+    double sum = 0;
+    const auto add = [&](double there, const glm::vec4& texel) {
+      glow += there * glm::dvec3(texel);
+      sum += there;
+    };
+    if (base_ && !whole && base_->pieces() > glow_->pieces()) {
+      base_->visit(mask(), [&](double share, const Weights& w, const glm::vec4& texel) {
+        const double there = double(is_blended() ? texel.a * vertex_color(w).a : texel.a);
+        add(share * there, glow_->look_at(w, no_alpha));
+      });
+    } else {
+      glow_->visit(no_alpha, [&](double share, const Weights& w, const glm::vec4& texel) {
+        add(share * (whole ? 1 : coverage_at(w)), texel);
+      });
+    }
+    return sum > 0 ? glow / sum : glow;
+  }
+
   const Surface& surface_;
   const SurfaceCorner (&corners_)[3];
   const double most_texels_;
+  std::optional<Footprint> base_, glow_;
   bool plain_ = true, solid_ = true;
-  glm::dvec3 base_{0}, glow_{0};
+  glm::dvec3 color_{0};
   double coverage_ = 0;
 };
 

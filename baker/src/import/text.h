@@ -74,7 +74,8 @@ inline double number_of(std::string_view word) {
   const auto result = std::from_chars(word.data(), word.data() + word.size(), value);
   if (result.ptr != word.data() + word.size() || word.empty()) return kNan;
   if (result.ec == std::errc::result_out_of_range) {
-    const bool tiny = word.find("e-") != word.npos || word.find("E-") != word.npos;
+    const size_t exponent = word.find_first_of("eE"), digit = word.find_first_of("123456789");
+    const bool tiny = exponent == word.npos ? word.find('.') < digit : word.substr(exponent + 1, 1) == "-";
     return tiny ? 0.0 : std::numeric_limits<double>::infinity();
   }
   return result.ec == std::errc() ? value : kNan;

@@ -100,6 +100,11 @@ glm::vec4 Texture::texel_times(float alpha, int64_t x, int64_t y, Wrap wrap_x, W
   return finest(wrapped(x, picture_.width, wrap_x), wrapped(y, picture_.height, wrap_y), alpha);
 }
 
+float Texture::least_alpha(int64_t x, int64_t y, Wrap wrap_x, Wrap wrap_y) const {
+  const size_t column = wrapped(x, picture_.width, wrap_x), row = wrapped(y, picture_.height, wrap_y);
+  return rule_.least(float(picture_.rgba[(row * picture_.width + column) * 4 + 3]) / 255.0f);
+}
+
 glm::vec4 Texture::bilinear(const glm::dvec2& at, Wrap wrap_x, Wrap wrap_y) const {
   const double x = std::floor(at.x - 0.5), y = std::floor(at.y - 0.5);
   const auto right = float(at.x - 0.5 - x), down = float(at.y - 0.5 - y);

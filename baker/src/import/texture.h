@@ -26,6 +26,12 @@ struct AlphaRule {
                                                     : 0.0f;
     return there * (1 - glass);
   }
+  // The least alpha of a vertex with which a mask's texel is there; infinite where none is enough.
+  float least(float texel_alpha) const {
+    if (cutoff <= 0) return 0;
+    const float most = texel_alpha * factor;
+    return most > 0 && cutoff <= 1 ? cutoff / most : INFINITY;
+  }
   auto operator<=>(const AlphaRule&) const = default;
 };
 
@@ -55,6 +61,8 @@ class Texture {
   glm::vec4 texel(size_t level, int64_t x, int64_t y, Wrap wrap_x, Wrap wrap_y) const;
   // The same with a vertex's alpha multiplied into the finest level's before the rule.
   glm::vec4 texel_times(float alpha, int64_t x, int64_t y, Wrap wrap_x, Wrap wrap_y) const;
+  // AlphaRule::least of a texel of the finest level.
+  float least_alpha(int64_t x, int64_t y, Wrap wrap_x, Wrap wrap_y) const;
   // Between the four nearest texels of the finest level; the position is in texels.
   glm::vec4 bilinear(const glm::dvec2& at, Wrap wrap_x, Wrap wrap_y) const;
 

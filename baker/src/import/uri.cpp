@@ -27,16 +27,29 @@ std::string decode_percent(std::string_view text) {
   return out;
 }
 
+// "file:" and the machine, which is this one, off a path.
+std::string without_scheme(const std::string& name) {
+  constexpr std::string_view kScheme = "file:", kMachine = "localhost/";
+  std::string_view path = name;
+  if (!equals_ignoring_case(path.substr(0, kScheme.size()), kScheme)) return name;
+  path.remove_prefix(kScheme.size());
+  if (!path.starts_with("//")) return std::string(path);
+  path.remove_prefix(2);
+  if (equals_ignoring_case(path.substr(0, kMachine.size()), kMachine))
+    path.remove_prefix(kMachine.size() - 1);
+  return std::string(path);
+}
+
 }  // namespace
 
 std::string decode_data_uri(const std::string& file, std::string_view uri) {
-  const auto fail = [&] {
-    return Failure(Exit::kInvalid, file, "has a data URI that is not base64, export it again");
+  const auto fail = [&](const char* what) {
+    return Failure(Exit::kInvalid, file, std::string("has a data URI ") + what + ", export it again");
   };
   const size_t comma = uri.find(',');
-  if (comma == uri.npos || comma < 7 || !equals_ignoring_case(uri.substr(comma - 7, 7), ";base64"))
-    throw fail();
+  if (comma == uri.npos) throw fail("without a comma before its data");
   const std::string body = decode_percent(uri.substr(comma + 1));
+  if (comma < 7 || !equals_ignoring_case(uri.substr(comma - 7, 7), ";base64")) return body;  // RFC 2397
   std::string out;
   out.reserve((uri.size() - comma) / 4 * 3);
   uint32_t bits = 0;
@@ -50,7 +63,7 @@ std::string decode_data_uri(const std::string& file, std::string_view uri) {
     if (c == '+' || c == '-') value = 62;
     if (c == '/' || c == '_') value = 63;
     if (c == '=') break;
-    if (value < 0) throw fail();
+    if (value < 0) throw fail("that is not base64 and says so");
     bits = bits << 6 | uint32_t(value);
     held += 6;
     if (held >= 8) out += char(bits >> (held -= 8));
@@ -72,10 +85,12 @@ std::filesystem::path resolve_uri(const std::filesystem::path& document, std::st
   }
   std::string slashes = decoded;
   std::replace(slashes.begin(), slashes.end(), '\\', '/');
-  const std::string local = decoded.starts_with("file://") ? decoded.substr(7) : decoded;
+  const std::string local = without_scheme(decoded);
+  // A query or fragment is for servers, but both characters stand in names, too.
+  const std::string bare = decode_percent(uri.substr(0, uri.find_first_of("?#")));
   const std::filesystem::path folder = document.parent_path();
   remark.clear();
-  for (const std::string& name : {local, std::string(uri), slashes}) {
+  for (const std::string& name : {local, std::string(uri), slashes, bare}) {
     std::error_code error;
     if (!std::filesystem::is_regular_file(folder / name, error)) continue;
     if (name != local) remark = "the URI " + std::string(uri) + " is no valid one, it is read as a path";
