@@ -14,7 +14,7 @@
 #include "lsp/command_line.h"
 #include "lsp/instanced_scene.hpp"
 #include "lsp/output_file.h"
-#include "lsp/print_json.h"
+#include "lsp/json_result.h"
 #include "lsp/trace_arguments.hpp"
 #include "picture.h"
 #include "renderer.h"
@@ -155,19 +155,19 @@ void report(const ViewReport& r, const ViewState& state, const Arguments& argume
                                   {"steps", r.steps[part]}};
   };
   if (common.json) {
-    print_json({{"file", arguments.file},
-                {"device", gpu.properties.deviceName},
-                {"effect", kEffects[state.effect]},
-                {"split", state.split},
-                {"dial", dial_name(state.approximate, scene)},
-                {"exposure", state.exposure},
-                {"camera", to_string(state.camera)},
-                {"samples", r.samples},
-                {"exact", half(VIEW_EXACT)},
-                {"approximate", half(VIEW_APPROXIMATE)},
-                {"incomplete", r.incomplete},
-                {"screenshot", arguments.screenshot},
-                {"validation_messages", gpu.messages}});
+    json_result() = {{"file", arguments.file},
+                     {"device", gpu.properties.deviceName},
+                     {"effect", kEffects[state.effect]},
+                     {"split", state.split},
+                     {"dial", dial_name(state.approximate, scene)},
+                     {"exposure", state.exposure},
+                     {"camera", to_string(state.camera)},
+                     {"samples", r.samples},
+                     {"exact", half(VIEW_EXACT)},
+                     {"approximate", half(VIEW_APPROXIMATE)},
+                     {"incomplete", r.incomplete},
+                     {"screenshot", arguments.screenshot},
+                     {"validation_messages", gpu.messages}};
   } else if (!common.quiet) {
     std::printf("%s, %s\n%s\ncamera %s%s\n", arguments.file.c_str(), gpu.properties.deviceName,
                 figures(r, state, scene).c_str(), to_string(state.camera).c_str(), up_option(state.camera));
