@@ -29,6 +29,7 @@ int main(int argc, char** argv) {
                {{"Options", {"REFERENCE.pfm", "TEST.pfm", "--output FILE", "--factor", "--max-rmse"}}});
   return run_program(kProgram, app, argc, argv, [&] {
     const std::filesystem::path inputs[] = {reference_path, test_path};
+    if (!output.empty()) check_picture_name(output);
     if (!output.empty()) check_output(output, inputs);
     const Picture reference = read_pfm(reference_path);
     const Picture test = read_pfm(test_path);

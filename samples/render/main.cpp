@@ -11,6 +11,7 @@
 #include "exposure.h"
 #include "heat.h"
 #include "lsp/command_line.h"
+#include "lsp/file_ending.h"
 #include "lsp/json_result.h"
 #include "lsp/lsp_vulkan.h"
 #include "lsp/output_file.h"
@@ -86,7 +87,7 @@ void run_heat(const Arguments& arguments, const CommonOptions& common, const Ren
                                });
   if (show_progress) std::fprintf(stderr, "\r               \r");
   for (const std::string& output : arguments.outputs) {
-    const bool colors = std::filesystem::path(output).extension() == ".png";
+    const bool colors = file_ending(output) == ".png";
     write_picture(output, colors ? in_colors(map) : map.values, Transfer::kDisplay);
   }
   if (common.json) {
@@ -183,10 +184,7 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
   options.width = size.x;
   options.height = size.y;
   for (const std::string& output : arguments.outputs) {
-    const std::filesystem::path ending = std::filesystem::path(output).extension();
-    if (ending != ".png" && ending != ".pfm") {
-      throw Failure(Exit::kUsage, output, "pictures are written as .png or .pfm; choose one of the two");
-    }
+    check_picture_name(output);
     check_output(output);
   }
   const std::optional<float> exposure = parse_exposure(arguments.exposure, !arguments.camera.empty());
@@ -221,7 +219,7 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
       exposure ? *exposure : chosen_exposure(report.surface_luminance, report.bright_luminance);
   for (const std::string& output : arguments.outputs) {
     Picture shown = picture;
-    if (std::filesystem::path(output).extension() == ".png" && !grey) {
+    if (file_ending(output) == ".png" && !grey) {
       for (glm::vec3& pixel : shown.pixels) pixel *= std::exp2(stops);
     }
     write_picture(output, shown, grey ? Transfer::kDisplay : Transfer::kToneMapped);

@@ -12,9 +12,10 @@
 #include "exposure.h"
 #include "exposure_meter.h"
 #include "lsp/command_line.h"
+#include "lsp/file_ending.h"
 #include "lsp/instanced_scene.hpp"
-#include "lsp/output_file.h"
 #include "lsp/json_result.h"
+#include "lsp/output_file.h"
 #include "lsp/trace_arguments.hpp"
 #include "picture.h"
 #include "renderer.h"
@@ -197,8 +198,7 @@ float automatic_exposure(const RenderScene& scene, const Sky& sky, const ViewSta
 
 // The file, or a mesh once it is baked.
 std::unique_ptr<RenderScene> open_scene(const std::string& file, const CommonOptions& common) {
-  const std::filesystem::path path(file);
-  if (path.extension() == ".lsp" || is_instanced_scene(file)) return std::make_unique<RenderScene>(path);
+  if (file_ending(file) == ".lsp" || is_instanced_scene(file)) return std::make_unique<RenderScene>(file);
   say(common, file, {"is baked first; to keep that: lsp-bake " + file + " -o scene.lsp"});
   const BakedFile baked(file, common.quiet);
   if (!common.quiet) {
@@ -216,7 +216,7 @@ void say_notes(const Arguments& arguments, const CommonOptions& common, const Re
 }
 
 void run(Arguments& arguments, const CommonOptions& common) {
-  if (!arguments.screenshot.empty() && std::filesystem::path(arguments.screenshot).extension() != ".png")
+  if (!arguments.screenshot.empty() && file_ending(arguments.screenshot) != ".png")
     throw Failure(Exit::kUsage, arguments.screenshot, "screenshots are written as .png; choose such a name");
   if (!arguments.screenshot.empty()) check_output(arguments.screenshot);
   if (!arguments.screenshot.empty() && arguments.frames == 0)
