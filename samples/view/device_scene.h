@@ -36,6 +36,7 @@ class DeviceScene {
  private:
   using Places = std::array<VkDeviceAddress, LSP_VULKAN_MAX_BUFFERS>;
   void plan(const VkPhysicalDeviceLimits& limits);
+  [[noreturn]] void refuse_size() const;
   template <class Destination>
   void upload_sections(size_t number, const Destination& destination);
   void upload_single();
