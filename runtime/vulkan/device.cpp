@@ -212,7 +212,8 @@ void Device::create_device(const VulkanOptions& options) {
   shares_memory = !options.discrete && (properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU ||
                                         properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU);
   imports = has_extension(physical, VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME);
-  limits.max_storage_buffer_range = properties.limits.maxStorageBufferRange;
+  limits.max_storage_buffer_range =
+      std::min(properties.limits.maxStorageBufferRange, options.max_storage_buffer_range);
   limits.max_group_count = properties.limits.maxComputeWorkGroupCount[0];
   // What a device does not know stays zero: no import, no largest buffer.
   auto host = vk_make<VkPhysicalDeviceExternalMemoryHostPropertiesEXT>(

@@ -29,6 +29,7 @@ struct VulkanOptions {
   bool validation = false;  // the Khronos layer, core and synchronization; see validation_messages
   bool addresses = false;   // read sections through buffer addresses even where other ways would do
   bool discrete = false;    // treat the device as a discrete GPU: staging buffers, never an import on its own
+  uint32_t max_storage_buffer_range = 0xFFFFFFFFu;  // or the device's, where that is less
 };
 
 struct VulkanTrace {
