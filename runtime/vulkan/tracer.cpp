@@ -428,8 +428,6 @@ bool VulkanTracer::available(std::string* why) { return Device::any(why); }
 
 VulkanTracer::VulkanTracer(const VulkanOptions& options) : impl_(std::make_unique<Impl>(options)) {}
 VulkanTracer::~VulkanTracer() = default;
-VulkanTracer::VulkanTracer(VulkanTracer&&) noexcept = default;
-VulkanTracer& VulkanTracer::operator=(VulkanTracer&&) noexcept = default;
 
 void VulkanTracer::load(const lsp_scene& scene, uint32_t uses, LoadPath path) {
   const lsp_scene* const scenes[] = {&scene};

@@ -50,8 +50,8 @@ class VulkanTracer {
 
   explicit VulkanTracer(const VulkanOptions& options = {});
   ~VulkanTracer();
-  VulkanTracer(VulkanTracer&&) noexcept;
-  VulkanTracer& operator=(VulkanTracer&&) noexcept;
+  VulkanTracer(const VulkanTracer&) = delete;
+  VulkanTracer& operator=(const VulkanTracer&) = delete;
 
   // Puts `scene` on the device for `uses` (LSP_USE_*), in place of the one before, and traces a ray to see
   // that it works. The scene's bytes must stay mapped until the next load or the end of the tracer: imported
