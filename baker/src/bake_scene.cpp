@@ -12,7 +12,7 @@
 #include "import/instances.h"
 #include "import/source_file.h"
 #include "lsp/instances.hpp"
-#include "lsp/print_json.h"
+#include "lsp/json_result.h"
 #include "lsp/program.h"
 #include "provenance.h"
 #include "report.h"
@@ -195,7 +195,7 @@ class SceneBake {
 
   void print() {
     if (a_.common.json) {
-      print_json(json());
+      json_result() = json();
     } else if (!a_.common.quiet) {
       print_text();
     }

@@ -9,8 +9,8 @@
 #include "bake_scene.h"
 #include "color_materials.h"
 #include "lsp/command_line.h"
+#include "lsp/json_result.h"
 #include "lsp/output_file.h"
-#include "lsp/print_json.h"
 #include "provenance.h"
 #include "report.h"
 #include "shard/write_shard.h"
@@ -46,12 +46,12 @@ void bake_one(Arguments& a, ProgressBar& bar) {
   const BakeReport report = {
       a, mesh, done.chosen.baked, done.chosen.error, done.written, import_seconds, done.write_seconds};
   if (a.common.json)
-    print_json(report_json(report, done.meta));
+    json_result() = report_json(report, done.meta);
   else if (!a.common.quiet)
     print_report(report);
 }
 
-Exit run(Arguments a) {
+void run(Arguments a) {
   settle(a);
   check_outputs(a, a.inputs);
   std::unique_ptr<tbb::global_control> control;
@@ -62,7 +62,6 @@ Exit run(Arguments a) {
     bake_scene(a, bar);
   else
     bake_one(a, bar);
-  return Exit::kDone;
 }
 
 const std::map<std::string, Purpose> kPurposes = {{"visibility", Purpose::kVisibility},
@@ -209,6 +208,6 @@ int main(int argc, char** argv) {
     a.resolution_given = app.count("--resolution") > 0;
     a.depth_given = app.count("--depth") > 0;
     a.samples_given = app.count("--samples") > 0;
-    return run(a);
+    run(a);
   });
 }

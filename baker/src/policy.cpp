@@ -8,7 +8,7 @@
 
 #include "accuracy.h"
 #include "box.h"
-#include "import/text.h"
+#include "lsp/file_ending.h"
 #include "lsp/program.h"
 
 namespace lsp {
@@ -43,7 +43,7 @@ std::string base_of(const Arguments& a) {
 
 // Throws where options contradict each other.
 void check(const Arguments& a) {
-  const bool scene = equals_ignoring_case(a.output.extension().string(), ".json");
+  const bool scene = file_ending(a.output) == ".json";
   if (a.instances && !scene)
     throw Failure(Exit::kUsage, a.output.string(),
                   "is no scene, which --instances writes: give -o NAME.json");

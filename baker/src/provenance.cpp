@@ -23,10 +23,12 @@ std::string name_beside(const std::filesystem::path& file, const std::filesystem
 }  // namespace
 
 void write_depfile(const Arguments& a, const std::vector<std::vector<std::filesystem::path>>& sources) {
+  // As Make, Ninja and CMake read a name. Rarer characters (; = | and quotes) have no escape that all three
+  // know.
   const auto escaped = [](const std::filesystem::path& path) {
     std::string text;
     for (const char c : path.string()) {
-      if (c == ' ' || c == '#') text += '\\';
+      if (c == ' ' || c == '#' || c == ':') text += '\\';
       if (c == '$') text += '$';
       text += c;
     }

@@ -13,8 +13,6 @@ uint32_t to_snorm(float v) {
          0xFFFFu;
 }
 
-float from_snorm(uint32_t half) { return static_cast<float>(static_cast<int16_t>(half)) / 32767.0f; }
-
 }  // namespace
 
 uint32_t encode_normal(const lsp_float3& n) {
@@ -26,18 +24,6 @@ uint32_t encode_normal(const lsp_float3& n) {
     x = folded;
   }
   return to_snorm(x) | to_snorm(y) << 16;
-}
-
-lsp_float3 decode_normal(uint32_t packed) {
-  float x = from_snorm(packed & 0xFFFFu), y = from_snorm(packed >> 16);
-  const float z = 1.0f - std::abs(x) - std::abs(y);
-  if (z < 0.0f) {
-    const float folded = (1.0f - std::abs(y)) * sign_not_zero(x);
-    y = (1.0f - std::abs(x)) * sign_not_zero(y);
-    x = folded;
-  }
-  const float length = std::sqrt(x * x + y * y + z * z);
-  return {x / length, y / length, z / length};
 }
 
 }  // namespace lsp::format

@@ -10,7 +10,6 @@ namespace lsp::format {
 
 // The unit normal nearest to the direction n, which must be finite and not zero.
 uint32_t encode_normal(const lsp_float3& n);
-lsp_float3 decode_normal(uint32_t packed);
 
 // Whether both halves lie in [-32767, 32767]; -32768 would stand for a component below -1.
 inline bool normal_sound(uint32_t packed) { return (packed & 0xFFFFu) != 0x8000u && packed >> 16 != 0x8000u; }

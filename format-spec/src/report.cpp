@@ -25,26 +25,26 @@ Verdict Report::verdict() const {
   return Verdict::kValid;
 }
 
-int exit_code(Verdict verdict) {
+Exit exit_code(Verdict verdict) {
   switch (verdict) {
     case Verdict::kValid:
-      return static_cast<int>(Exit::kDone);
+      return Exit::kDone;
     case Verdict::kInvalid:
-      return static_cast<int>(Exit::kInvalid);
+      return Exit::kInvalid;
     case Verdict::kUnsupported:
-      return static_cast<int>(Exit::kUnsupported);
+      return Exit::kUnsupported;
     case Verdict::kLimit:
-      return static_cast<int>(Exit::kLimit);
+      return Exit::kLimit;
     case Verdict::kDiffer:
-      return static_cast<int>(Exit::kDiffer);
+      return Exit::kDiffer;
   }
-  return static_cast<int>(Exit::kInternal);
+  return Exit::kInternal;
 }
 
 nlohmann::ordered_json to_json(const Report& report) {
   nlohmann::ordered_json json;
   json["verdict"] = to_string(report.verdict());
-  json["exit"] = exit_code(report.verdict());
+  json["exit"] = static_cast<int>(exit_code(report.verdict()));
   for (Severity severity : {Severity::kFatal, Severity::kError, Severity::kWarning, Severity::kInfo})
     json["counts"][to_string(severity)] = report.count(severity);
   json["findings"] = nlohmann::ordered_json::array();

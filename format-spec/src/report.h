@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "lsp/program.h"
 #include "rules.h"
 
 namespace lsp::format {
@@ -55,8 +56,8 @@ class Report {
   std::map<RuleId, Finding> findings_;
 };
 
-// The exit code of a verdict (CONTRACT: 0 valid, 3 invalid, 5 unsupported, 6 limit, 7 differ).
-int exit_code(Verdict verdict);
+// The exit code of a verdict.
+Exit exit_code(Verdict verdict);
 
 // The report as report.schema.json describes it, without the file's name.
 nlohmann::ordered_json to_json(const Report& report);

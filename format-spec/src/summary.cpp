@@ -322,8 +322,6 @@ Json summarize(std::span<const std::byte> file, const std::string& name, uint64_
 
   const LspHeader& header = view.header;
   Json json;
-  json["program"] = "lsp-info";
-  json["version"] = kProgramVersion;
   json["file"] = name;
   json["bytes"] = file.size();
   json["format"] = std::to_string(header.version_major) + "." + std::to_string(header.version_minor);

@@ -7,7 +7,7 @@
 #include "annotate.h"
 #include "file.h"
 #include "lsp/command_line.h"
-#include "lsp/print_json.h"
+#include "lsp/json_result.h"
 #include "summary.h"
 #include "view.h"
 
@@ -47,8 +47,6 @@ void print_annotation(const Arguments& arguments, const CommonOptions& common,
     return;
   }
   Json json;
-  json["program"] = "lsp-info";
-  json["version"] = kProgramVersion;
   json["file"] = arguments.file;
   json["bytes"] = bytes.size();
   json["ranges"] = Json::array();
@@ -56,15 +54,15 @@ void print_annotation(const Arguments& arguments, const CommonOptions& common,
     json["ranges"].push_back(
         {{"offset", range.offset}, {"bytes", range.bytes}, {"path", range.path}, {"meaning", range.meaning}});
   });
-  print_json(json);
+  json_result() = json;
 }
 
-int show(const Arguments& arguments, const CommonOptions& common) {
+void show(const Arguments& arguments, const CommonOptions& common) {
   const MappedFile file(arguments.file);
   if (arguments.annotate) {
     find_section(file.bytes(), arguments);
     if (common.json || !common.quiet) print_annotation(arguments, common, file.bytes());
-    return 0;
+    return;
   }
   Json summary = summarize(file.bytes(), arguments.file, arguments.memory_limit);
   find_section(file.bytes(), arguments);
@@ -72,10 +70,9 @@ int show(const Arguments& arguments, const CommonOptions& common) {
     Json& sections = summary["sections"];
     for (size_t i = sections.size(); i-- > 0 && !arguments.section.empty();)
       if (sections[i]["name"] != arguments.section) sections.erase(i);
-    print_json(summary);
+    json_result() = summary;
   } else if (!common.quiet)
     std::fputs(summary_text(summary, arguments.section).c_str(), stdout);
-  return 0;
 }
 
 }  // namespace
@@ -96,5 +93,5 @@ int main(int argc, char** argv) {
   add_common_options(app, "lsp-info", common);
   arrange_help(app, "lsp-info room.lsp --annotate",
                {{"Options", {"FILE.lsp", "--annotate", "--section NAME", "--memory-limit"}}});
-  return run_program("lsp-info", app, argc, argv, [&] { return show(arguments, common); });
+  return run_program("lsp-info", app, argc, argv, [&] { show(arguments, common); });
 }

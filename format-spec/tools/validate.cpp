@@ -8,7 +8,7 @@
 #include "check.h"
 #include "file.h"
 #include "lsp/command_line.h"
-#include "lsp/print_json.h"
+#include "lsp/json_result.h"
 #include "source.h"
 
 namespace {
@@ -44,9 +44,9 @@ const char* advice(Verdict verdict) {
 
 // What is to be said of a file.
 struct Outcome {
-  int exit = 0;
-  std::string text;  // findings, a line each
-  std::string last;  // of standard error; empty where the file is valid
+  Exit exit = Exit::kDone;
+  std::string text;   // findings, a line each
+  std::string error;  // empty where the file is valid
   nlohmann::ordered_json json;
 };
 
@@ -67,7 +67,7 @@ Outcome check(const std::string& path, const Arguments& arguments) {
   outcome.text = to_text(report);
   const uint64_t errors = report.count(Severity::kFatal) + report.count(Severity::kError);
   if (verdict != Verdict::kValid) {
-    outcome.last =
+    outcome.error =
         std::string(advice(verdict)) + " (" + std::to_string(errors) + (errors == 1 ? " error)" : " errors)");
   }
   outcome.json["program"] = "lsp-validate";
@@ -76,6 +76,7 @@ Outcome check(const std::string& path, const Arguments& arguments) {
   outcome.json["bytes"] = file.bytes().size();
   outcome.json["level"] = arguments.level;
   outcome.json.update(to_json(report));
+  if (!outcome.error.empty()) outcome.json["error"] = outcome.error;
   return outcome;
 }
 
@@ -85,48 +86,47 @@ Outcome check_or_say_why(const std::string& path, const Arguments& arguments) {
     return check(path, arguments);
   } catch (const Failure& failure) {
     const int exit = static_cast<int>(failure.exit());
-    return {exit, "", failure.what(), {{"file", path}, {"exit", exit}, {"message", failure.what()}}};
+    return {failure.exit(), "", failure.what(), {{"file", path}, {"exit", exit}, {"error", failure.what()}}};
   }
 }
 
-void print_last(const std::string& path, const Outcome& outcome) {
-  if (!outcome.last.empty())
-    std::fprintf(stderr, "lsp-validate: %s: %s\n", path.c_str(), outcome.last.c_str());
-}
-
-int validate_one(const std::string& path, const Arguments& arguments, const CommonOptions& common) {
+Ending validate_one(const std::string& path, const Arguments& arguments, const CommonOptions& common) {
   const Outcome outcome = check(path, arguments);
   if (common.json)
-    print_json(outcome.json);
+    json_result() = outcome.json;
   else if (!common.quiet)
     std::fputs(outcome.text.c_str(), stdout);
-  print_last(path, outcome);
-  return outcome.exit;
+  return {outcome.exit, path, outcome.error};
 }
 
 // The exit code is that of the first file that is not valid; every file is checked.
-int validate_all(const Arguments& arguments, const CommonOptions& common) {
+Ending validate_all(const Arguments& arguments, const CommonOptions& common) {
   if (!arguments.meshes.empty())
     throw Failure(Exit::kUsage, "", "--mesh is of one file; check the others by themselves");
-  int exit = 0;
+  Ending ending;
+  size_t bad = 0;
   nlohmann::ordered_json files = nlohmann::ordered_json::array();
   for (const std::string& path : arguments.files) {
     const Outcome outcome = check_or_say_why(path, arguments);
-    if (exit == 0) exit = outcome.exit;
     std::istringstream lines(common.json || common.quiet ? "" : outcome.text);
     for (std::string line; std::getline(lines, line);) std::printf("%s: %s\n", path.c_str(), line.c_str());
-    print_last(path, outcome);
     files.push_back(outcome.json);
+    if (outcome.exit == Exit::kDone) continue;
+    if (bad++ == 0) ending.exit = outcome.exit;
+    std::fprintf(stderr, "lsp-validate: %s: %s\n", path.c_str(), outcome.error.c_str());
   }
-  if (common.json)
-    print_json({{"program", "lsp-validate"}, {"version", kProgramVersion}, {"exit", exit}, {"files", files}});
-  return exit;
+  json_result() = {{"files", files}};
+  if (bad > 0)
+    ending.error =
+        std::to_string(bad) + " of " + std::to_string(files.size()) + " files cannot be used as they are";
+  return ending;
 }
 
-int validate(const Arguments& arguments, const CommonOptions& common) {
+Ending validate(const Arguments& arguments, const CommonOptions& common) {
   if (arguments.rules) {
+    if (common.json) throw Failure(Exit::kUsage, "", "--rules is Markdown; leave --json out");
     std::fputs(rules_markdown().c_str(), stdout);
-    return 0;
+    return {};
   }
   if (arguments.files.empty()) throw Failure(Exit::kUsage, "", "FILE.lsp is missing, see --help");
   return arguments.files.size() == 1 ? validate_one(arguments.files[0], arguments, common)

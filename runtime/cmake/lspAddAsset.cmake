@@ -38,9 +38,17 @@ function(lsp_add_asset target output)
     set(instances --instances)
   endif()
   file(RELATIVE_PATH name ${CMAKE_BINARY_DIR} ${output})
+  if(name MATCHES "^\\.\\./")
+    set(name ${output})
+  endif()
+  if(CMAKE_GENERATOR MATCHES "Ninja")
+    # Ninja reads the depfile as it is, with the output as Ninja calls it: CMake would write it anew and leave # and $
+    # in names as they are, which Ninja reads as something else.
+    cmake_policy(SET CMP0116 OLD)
+  endif()
   add_custom_command(OUTPUT ${output}
-    COMMAND ${bake} ${sources} -o ${output} ${instances} --depfile ${output}.d --quiet ${ARG_OPTIONS}
-    DEPENDS ${bake} ${sources} DEPFILE ${output}.d
+    COMMAND ${bake} ${sources} -o ${name} ${instances} --depfile ${output}.d --quiet ${ARG_OPTIONS}
+    DEPENDS ${bake} ${sources} DEPFILE ${output}.d WORKING_DIRECTORY ${CMAKE_BINARY_DIR}
     COMMENT "Baking ${name}" VERBATIM COMMAND_EXPAND_LISTS)
 
   # A target of the asset's own, so that one asset is baked once even where several targets want it.

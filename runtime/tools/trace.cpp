@@ -10,8 +10,8 @@
 #include "lsp/command_line.h"
 #include "lsp/in_chunks.hpp"
 #include "lsp/instanced_scene.hpp"
+#include "lsp/json_result.h"
 #include "lsp/output_file.h"
-#include "lsp/print_json.h"
 #include "lsp/scene_file.hpp"
 #include "lsp/trace_arguments.hpp"
 #include "ray_files.h"
@@ -147,8 +147,6 @@ nlohmann::ordered_json to_json(const Options& options, const TraceRequest& reque
                                const TraceReport& report) {
   const lsp_trace_counts& counts = report.counts;
   nlohmann::ordered_json json;
-  json["program"] = "lsp-trace";
-  json["version"] = kProgramVersion;
   json["file"] = options.file;
   if (const InstancedScene* instanced = scene.instanced(); instanced != nullptr) {
     json["instances"] = instanced->instances().size();
@@ -212,7 +210,7 @@ void print(const nlohmann::ordered_json& json) {
   }
 }
 
-Exit run(const Options& options) {
+void run(const Options& options) {
   const std::filesystem::path inputs[] = {options.file, options.rays};
   check_output(options.hits, inputs);
   const Scene scene(options.file);
@@ -240,11 +238,10 @@ Exit run(const Options& options) {
   }
   write_hits(options.hits, hits);
   if (options.common.json) {
-    print_json(json);
+    json_result() = json;
   } else if (!options.common.quiet) {
     print(json);
   }
-  return Exit::kDone;
 }
 
 }  // namespace
@@ -256,5 +253,5 @@ int main(int argc, char** argv) {
       "hits.");
   lsp::Options options;
   lsp::define(app, options);
-  return lsp::run_program("lsp-trace", app, argc, argv, [&] { return lsp::run(options); });
+  return lsp::run_program("lsp-trace", app, argc, argv, [&] { lsp::run(options); });
 }

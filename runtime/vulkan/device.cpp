@@ -6,6 +6,8 @@
 #include <cstring>
 #include <utility>
 
+#include "lsp/vk_start.hpp"
+
 namespace lsp {
 namespace {
 
@@ -25,22 +27,6 @@ VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlagBitsEXT
   const std::lock_guard lock(device->messages_mutex);
   device->messages.emplace_back(data->pMessage);
   return VK_FALSE;
-}
-
-// Better first: a real GPU before the software one.
-int rank(VkPhysicalDeviceType type) {
-  switch (type) {
-    case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:
-      return 0;
-    case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU:
-      return 1;
-    case VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU:
-      return 2;
-    case VK_PHYSICAL_DEVICE_TYPE_CPU:
-      return 3;
-    default:
-      return 4;
-  }
 }
 
 // The first queue family that computes; -1: none.
@@ -154,15 +140,8 @@ void Device::create_instance(const VulkanOptions& options) {
   auto features = vk_make<VkValidationFeaturesEXT>(VK_STRUCTURE_TYPE_VALIDATION_FEATURES_EXT);
   features.enabledValidationFeatureCount = 1;
   features.pEnabledValidationFeatures = &enabled;
-  auto messenger =
-      vk_make<VkDebugUtilsMessengerCreateInfoEXT>(VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT);
+  VkDebugUtilsMessengerCreateInfoEXT messenger = messenger_info(on_message, this);
   messenger.pNext = &features;
-  messenger.messageSeverity =
-      VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT;
-  messenger.messageType =
-      VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_TYPE_GENERAL_BIT_EXT;
-  messenger.pfnUserCallback = on_message;
-  messenger.pUserData = this;
   const char* extensions[] = {VK_EXT_DEBUG_UTILS_EXTENSION_NAME, VK_EXT_VALIDATION_FEATURES_EXTENSION_NAME};
   if (options.validation) {
     info.enabledLayerCount = 1;
@@ -195,8 +174,8 @@ void Device::choose_physical(const VulkanOptions& options) {
     if (std::string(found.deviceName).find(options.device) == std::string::npos) continue;
     VkQueueFamilyProperties queue_properties{};
     const int family = compute_family(candidate, &queue_properties);
-    if (found.apiVersion < kApiVersion || family < 0 || rank(found.deviceType) >= best) continue;
-    best = rank(found.deviceType);
+    if (found.apiVersion < kApiVersion || family < 0 || device_rank(found.deviceType) >= best) continue;
+    best = device_rank(found.deviceType);
     physical = candidate;
     properties = found;
     family_ = static_cast<uint32_t>(family);
@@ -212,7 +191,8 @@ void Device::create_device(const VulkanOptions& options) {
   shares_memory = !options.discrete && (properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU ||
                                         properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU);
   imports = has_extension(physical, VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME);
-  limits.max_storage_buffer_range = properties.limits.maxStorageBufferRange;
+  limits.max_storage_buffer_range =
+      std::min(properties.limits.maxStorageBufferRange, options.max_storage_buffer_range);
   limits.max_group_count = properties.limits.maxComputeWorkGroupCount[0];
   // What a device does not know stays zero: no import, no largest buffer.
   auto host = vk_make<VkPhysicalDeviceExternalMemoryHostPropertiesEXT>(

@@ -16,14 +16,6 @@ constexpr VkExternalMemoryHandleTypeFlagBits kHostPointer =
 
 [[noreturn]] void refuse(const std::string& why) { throw Failure(Exit::kUnsupported, "", why); }
 
-lsp_vulkan_plan make_plan(const Device& device, const lsp_scene& scene, uint32_t uses) {
-  lsp_vulkan_plan plan;
-  lsp_error error;
-  const lsp_status status = lsp_vulkan_plan_buffers(&scene, uses, &device.limits, &plan, &error);
-  if (status != LSP_OK) throw Failure(static_cast<Exit>(status), "", error.message);
-  return plan;
-}
-
 // Staging memory and the commands that empty it.
 struct Slot {
   explicit Slot(Device& device)
@@ -115,13 +107,13 @@ void check_importable(const Device& device) {
 SceneBuffers::SceneBuffers(SceneBuffers&& other) noexcept
     : device_(other.device_),
       plan_(other.plan_),
+      places_(other.places_),
       addresses_(std::move(other.addresses_)),
       owned_(std::move(other.owned_)),
       imported_(std::exchange(other.imported_, VK_NULL_HANDLE)),
       bytes_imported_(other.bytes_imported_),
       bytes_uploaded_(other.bytes_uploaded_) {
   std::copy(std::begin(other.handles_), std::end(other.handles_), handles_);
-  std::copy(std::begin(other.places_), std::end(other.places_), places_);
   std::fill(std::begin(other.handles_), std::end(other.handles_), VkBuffer{VK_NULL_HANDLE});
 }
 
@@ -131,9 +123,9 @@ SceneBuffers::~SceneBuffers() {
   device_->vk.vkFreeMemory(device_->handle, imported_, nullptr);
 }
 
-SceneBuffers SceneBuffers::import_mapping(Device& device, const lsp_scene& scene, uint32_t uses) {
-  SceneBuffers result(device);
-  result.plan_ = make_plan(device, scene, uses);
+SceneBuffers SceneBuffers::import_mapping(Device& device, const lsp_scene& scene,
+                                          const lsp_vulkan_plan& plan) {
+  SceneBuffers result(device, plan);
   lsp_error error;
   if (lsp_vulkan_check_import(&scene, &device.limits, &error) != LSP_OK) refuse(error.message);
   check_importable(device);
@@ -184,9 +176,9 @@ SceneBuffers SceneBuffers::import_mapping(Device& device, const lsp_scene& scene
   return result;
 }
 
-SceneBuffers SceneBuffers::upload(Device& device, const lsp_scene& scene, uint32_t uses, bool staging) {
-  SceneBuffers result(device);
-  result.plan_ = make_plan(device, scene, uses);
+SceneBuffers SceneBuffers::upload(Device& device, const lsp_scene& scene, const lsp_vulkan_plan& plan,
+                                  bool staging) {
+  SceneBuffers result(device, plan);
   result.owned_.reserve(result.plan_.buffer_count);
   std::vector<Destination> to;
   for (uint32_t i = 0; i < result.plan_.buffer_count; ++i) {
@@ -202,26 +194,18 @@ SceneBuffers SceneBuffers::upload(Device& device, const lsp_scene& scene, uint32
 }
 
 std::vector<SceneBuffers> SceneBuffers::upload_pool(Device& device, std::span<const lsp_scene* const> scenes,
-                                                    uint32_t uses, bool staging, Buffer& pool) {
+                                                    const PoolPlan& plan, bool staging, Buffer& pool) {
   std::vector<SceneBuffers> results;
-  uint64_t bytes = 0;
-  for (size_t i = 0; i < scenes.size(); ++i) {
-    SceneBuffers result(device);
-    result.plan_ = make_plan(device, *scenes[i], uses);
-    lsp_error error;
-    const lsp_status status =
-        lsp_vulkan_place_buffers(&result.plan_, &device.limits, &bytes, result.places_, &error);
-    if (status != LSP_OK)
-      throw Failure(static_cast<Exit>(status), "", "asset " + std::to_string(i) + ": " + error.message);
-    result.bytes_uploaded_ = result.plan_.bytes;
-    results.push_back(std::move(result));
-  }
-  pool = Buffer(device, bytes, LSP_VULKAN_BUFFER_USAGE, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT,
+  pool = Buffer(device, plan.bytes, LSP_VULKAN_BUFFER_USAGE, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT,
                 staging ? 0 : kHostMemory);
   for (size_t i = 0; i < scenes.size(); ++i) {
+    SceneBuffers result(device, plan.buffers[i]);
+    result.places_ = plan.places[i];
+    result.bytes_uploaded_ = result.plan_.bytes;
     std::vector<Destination> to;
-    for (uint32_t k = 0; k < results[i].plan_.buffer_count; ++k) to.push_back({&pool, results[i].places_[k]});
-    upload_sections(device, *scenes[i], results[i].plan_, to, staging);
+    for (uint32_t k = 0; k < result.plan_.buffer_count; ++k) to.push_back({&pool, result.places_[k]});
+    upload_sections(device, *scenes[i], result.plan_, to, staging);
+    results.push_back(std::move(result));
   }
   return results;
 }
@@ -234,7 +218,7 @@ void SceneBuffers::write_addresses() {
     places_[i] = device_->vk.vkGetBufferDeviceAddress(device_->handle, &info);
   }
   VkDeviceAddress table[LSP_VULKAN_ADDRESS_COUNT];
-  lsp_vulkan_address_table(&plan_, places_, table);
+  lsp_vulkan_address_table(&plan_, places_.data(), table);
   addresses_ = Buffer(*device_, sizeof table, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, kHostMemory, 0);
   memcpy(addresses_.mapped(), table, sizeof table);
 }

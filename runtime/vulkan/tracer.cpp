@@ -129,11 +129,12 @@ class VulkanTracer::Impl {
   void open();
   void close() noexcept;
   void unload() noexcept;
-  void load_all(std::span<const lsp_scene* const> scenes, LoadPath path, bool numbered);
-  void load_next(const lsp_scene& scene, LoadPath path);
-  void load_pool(std::span<const lsp_scene* const> scenes);
-  bool fits_pool(std::span<const lsp_scene* const> scenes) const;
-  bool try_import(const lsp_scene& scene, bool forced);
+  void load_all(std::span<const lsp_scene* const> scenes, LoadPath path);
+  void load_next(const lsp_scene& scene, const lsp_vulkan_plan& plan, LoadPath path);
+  void plan(std::span<const lsp_scene* const> scenes);
+  bool pooled() const { return instanced_ && (uses_ & LSP_USE_ADDRESSES_ALWAYS) == 0; }
+  std::string name_of_scene(size_t number) const;
+  bool try_import(const lsp_scene& scene, const lsp_vulkan_plan& plan, bool forced);
   void attach(const lsp_scene& scene, SceneBuffers&& buffers, bool imported);
   void try_instances();
   void check_assets(std::span<const lsp_scene* const> scenes) const;
@@ -144,6 +145,7 @@ class VulkanTracer::Impl {
   VulkanOptions options_;
   uint32_t uses_ = 0;
   bool instanced_ = false;  // the scenes are assets of instances
+  PoolPlan plan_;           // of the scenes that are loaded
   std::string name_;        // of the scene that is being loaded, before what is wrong with it
   std::unique_ptr<RayBatches> batches_;
   std::unique_ptr<TraceShader> shader_;
@@ -181,16 +183,9 @@ void VulkanTracer::Impl::unload() noexcept {
 
 // Refuses, by its number, an asset that the shader of instances cannot trace for every use.
 void VulkanTracer::Impl::check_assets(std::span<const lsp_scene* const> scenes) const {
-  std::vector<lsp_vulkan_plan> plans(scenes.size());
-  for (size_t i = 0; i < scenes.size(); ++i) {
-    lsp_error error;
-    const lsp_status status = lsp_vulkan_plan_buffers(scenes[i], uses_, &device->limits, &plans[i], &error);
-    if (status != LSP_OK)
-      throw Failure(static_cast<Exit>(status), "", "asset " + std::to_string(i) + ": " + error.message);
-  }
-  if ((uses_ & LSP_USE_EXACT) != 0) plan_instances(scenes, plans, options_for(LSP_USE_EXACT));
+  if ((uses_ & LSP_USE_EXACT) != 0) plan_instances(scenes, plan_.buffers, options_for(LSP_USE_EXACT));
   if ((uses_ & (LSP_USE_APPROXIMATE | LSP_USE_TABLES)) != 0)
-    plan_instances(scenes, plans, options_for(LSP_USE_APPROXIMATE));
+    plan_instances(scenes, plan_.buffers, options_for(LSP_USE_APPROXIMATE));
 }
 
 // Rays of one use, such as what is loaded can answer.
@@ -239,11 +234,11 @@ void VulkanTracer::Impl::try_instances() {
   trace_instances(instances.view(), options_for(uses_ & LSP_USE_EXACT), 0xFF, {&ray, 1}, {&hit, 1}, false);
 }
 
-bool VulkanTracer::Impl::try_import(const lsp_scene& scene, bool forced) {
+bool VulkanTracer::Impl::try_import(const lsp_scene& scene, const lsp_vulkan_plan& plan, bool forced) {
   std::string why = "the device has memory of its own";
   if (forced || device->shares_memory) {
     try {
-      attach(scene, SceneBuffers::import_mapping(*device, scene, uses_), true);
+      attach(scene, SceneBuffers::import_mapping(*device, scene, plan), true);
       return true;
     } catch (const DeviceLost&) {
       throw;
@@ -256,49 +251,46 @@ bool VulkanTracer::Impl::try_import(const lsp_scene& scene, bool forced) {
   return false;
 }
 
-void VulkanTracer::Impl::load_next(const lsp_scene& scene, LoadPath path) {
-  // What no way of loading can mend is said before the first is tried.
-  lsp_vulkan_plan plan;
-  lsp_error error;
-  const lsp_status status = lsp_vulkan_plan_buffers(&scene, uses_, &device->limits, &plan, &error);
-  if (status != LSP_OK) throw Failure(static_cast<Exit>(status), "", error.message);
-  if (path != LoadPath::kUpload && try_import(scene, path == LoadPath::kImport)) return;
-  attach(scene, SceneBuffers::upload(*device, scene, uses_, options_.discrete), false);
+void VulkanTracer::Impl::load_next(const lsp_scene& scene, const lsp_vulkan_plan& plan, LoadPath path) {
+  if (path != LoadPath::kUpload && try_import(scene, plan, path == LoadPath::kImport)) return;
+  attach(scene, SceneBuffers::upload(*device, scene, plan, options_.discrete), false);
 }
 
-// Whether one storage buffer holds all assets. What else is wrong with one is said when it is loaded.
-bool VulkanTracer::Impl::fits_pool(std::span<const lsp_scene* const> scenes) const {
-  uint64_t bytes = 0;
-  for (const lsp_scene* scene : scenes) {
-    lsp_vulkan_plan plan;
-    VkDeviceAddress places[LSP_VULKAN_MAX_BUFFERS];
-    if (lsp_vulkan_plan_buffers(scene, uses_, &device->limits, &plan, nullptr) == LSP_OK &&
-        lsp_vulkan_place_buffers(&plan, &device->limits, &bytes, places, nullptr) != LSP_OK)
-      return false;
+// Which buffers the scenes need, and of assets that are not read through addresses where in the pool they
+// lie. What no way of loading can mend is said here, before the first is tried.
+void VulkanTracer::Impl::plan(std::span<const lsp_scene* const> scenes) {
+  plan_ = {};
+  for (size_t i = 0; i < scenes.size(); ++i) {
+    lsp_vulkan_plan& buffers = plan_.buffers.emplace_back();
+    lsp_error error;
+    lsp_status status = lsp_vulkan_plan_buffers(scenes[i], uses_, &device->limits, &buffers, &error);
+    if (status == LSP_OK && pooled())
+      status = lsp_vulkan_place_buffers(&buffers, &device->limits, &plan_.bytes,
+                                        plan_.places.emplace_back().data(), &error);
+    if (status != LSP_OK) throw Failure(static_cast<Exit>(status), "", name_of_scene(i) + error.message);
   }
-  return true;
 }
 
-void VulkanTracer::Impl::load_pool(std::span<const lsp_scene* const> scenes) {
-  name_.clear();
-  std::vector<SceneBuffers> buffers =
-      SceneBuffers::upload_pool(*device, scenes, uses_, options_.discrete, pool_);
-  for (size_t i = 0; i < scenes.size(); ++i) attach(*scenes[i], std::move(buffers[i]), false);
+std::string VulkanTracer::Impl::name_of_scene(size_t number) const {
+  return instanced_ ? "asset " + std::to_string(number) + ": " : "";
 }
 
-void VulkanTracer::Impl::load_all(std::span<const lsp_scene* const> scenes, LoadPath path, bool numbered) {
-  unload();
-  if (numbered) check_assets(scenes);
+void VulkanTracer::Impl::load_all(std::span<const lsp_scene* const> scenes, LoadPath path) {
+  if (instanced_) check_assets(scenes);
   uint32_t stack = 1;
   for (const lsp_scene* scene : scenes) stack = std::max(stack, scene->header->max_stack);
   pipelines_ = std::make_unique<Pipelines>(*device, *shader_, stack);
   loaded.reserve(scenes.size());
-  const bool pooled = numbered && (uses_ & LSP_USE_ADDRESSES_ALWAYS) == 0;
-  if (pooled) load_pool(scenes);
-  for (size_t i = 0; i < scenes.size() && !pooled; ++i) {
-    name_ = numbered ? "asset " + std::to_string(i) + ": " : "";
+  if (pooled()) {
+    name_.clear();
+    std::vector<SceneBuffers> buffers =
+        SceneBuffers::upload_pool(*device, scenes, plan_, options_.discrete, pool_);
+    for (size_t i = 0; i < scenes.size(); ++i) attach(*scenes[i], std::move(buffers[i]), false);
+  }
+  for (size_t i = loaded.size(); i < scenes.size(); ++i) {
+    name_ = name_of_scene(i);
     try {
-      load_next(*scenes[i], path);
+      load_next(*scenes[i], plan_.buffers[i], path);
     } catch (const DeviceLost&) {
       throw;
     } catch (const Failure& failure) {
@@ -306,7 +298,7 @@ void VulkanTracer::Impl::load_all(std::span<const lsp_scene* const> scenes, Load
       throw Failure(failure.exit(), failure.file(), name_ + failure.what());
     }
   }
-  if (numbered && !loaded.empty()) try_instances();
+  if (instanced_ && !loaded.empty()) try_instances();
 }
 
 void VulkanTracer::Impl::load(std::span<const lsp_scene* const> scenes, uint32_t uses, LoadPath path,
@@ -314,16 +306,24 @@ void VulkanTracer::Impl::load(std::span<const lsp_scene* const> scenes, uint32_t
   const auto start = std::chrono::steady_clock::now();
   instanced_ = numbered;
   uses_ = uses | (device->address_uses & (numbered ? LSP_USE_ADDRESSES_ALWAYS : ~0u));
-  // Only by addresses assets are read where they are, and as many bytes as there may be.
-  if (numbered && (path == LoadPath::kImport || (device->address_uses != 0 && !fits_pool(scenes))))
-    uses_ |= LSP_USE_ADDRESSES_ALWAYS;
+  // Only by addresses assets are read where they are.
+  if (numbered && path == LoadPath::kImport) uses_ |= LSP_USE_ADDRESSES_ALWAYS;
   if ((uses_ & LSP_USE_ADDRESSES_ALWAYS) != 0 && device->address_uses == 0)
     throw Failure(Exit::kUnsupported, "",
                   "assets can be imported only where they are read through buffer addresses "
                   "(bufferDeviceAddress), which the device lacks; upload them");
   load_note.clear();
+  unload();
   try {
-    load_all(scenes, path, numbered);
+    plan(scenes);
+  } catch (const Failure& failure) {
+    // So are as many bytes as there may be.
+    if (!numbered || failure.exit() != Exit::kLimit || device->address_uses == 0) throw;
+    uses_ |= LSP_USE_ADDRESSES_ALWAYS;
+    plan(scenes);
+  }
+  try {
+    load_all(scenes, path);
   } catch (const DeviceLost& lost) {
     // An import may cost the device: on a new one everything is a copy.
     if (path == LoadPath::kUpload) throw;
@@ -332,7 +332,7 @@ void VulkanTracer::Impl::load(std::span<const lsp_scene* const> scenes, uint32_t
     load_note = name_ + lost.what();
     if (path == LoadPath::kImport)
       throw Failure(Exit::kUnsupported, "", name_ + "the mapping cannot be imported: " + lost.what());
-    load_all(scenes, LoadPath::kUpload, numbered);
+    load_all(scenes, LoadPath::kUpload);
   }
   const bool imported = std::ranges::any_of(loaded, &Loaded::imported);
   load_path = imported ? LoadPath::kImport : LoadPath::kUpload;
@@ -396,8 +396,7 @@ void VulkanTracer::Impl::put_instances(const lsp_instances& instances, const lsp
     lsp_error error;
     const lsp_status status = lsp_vulkan_describe_asset(&loaded[i].scene, &buffers.plan(), buffers.places(),
                                                         &options, &described[i], &error);
-    if (status != LSP_OK)
-      throw Failure(static_cast<Exit>(status), "", "asset " + std::to_string(i) + ": " + error.message);
+    if (status != LSP_OK) throw Failure(static_cast<Exit>(status), "", name_of_scene(i) + error.message);
   }
   const size_t bytes = described.size() * sizeof described[0];
   if (assets_.handle() == VK_NULL_HANDLE)
@@ -455,8 +454,6 @@ bool VulkanTracer::available(std::string* why) { return Device::any(why); }
 
 VulkanTracer::VulkanTracer(const VulkanOptions& options) : impl_(std::make_unique<Impl>(options)) {}
 VulkanTracer::~VulkanTracer() = default;
-VulkanTracer::VulkanTracer(VulkanTracer&&) noexcept = default;
-VulkanTracer& VulkanTracer::operator=(VulkanTracer&&) noexcept = default;
 
 void VulkanTracer::load(const lsp_scene& scene, uint32_t uses, LoadPath path) {
   const lsp_scene* const scenes[] = {&scene};

@@ -7,8 +7,8 @@
 #include <sstream>
 
 #include "lsp/command_line.h"
+#include "lsp/json_result.h"
 #include "lsp/output_file.h"
-#include "lsp/print_json.h"
 #include "page.h"
 
 namespace lsp::sample {
@@ -74,7 +74,7 @@ int main(int argc, char** argv) {
                               read_file(folder + "/difference.png")};
       write_file(output, make_page(figures, pictures));
       if (common.json) {
-        print_json({{"report", output}});
+        json_result() = {{"report", output}};
       } else if (!common.quiet) {
         std::cout << make_summary(figures) << "report: " << output << "\n";
       }

@@ -4,8 +4,8 @@
 
 #include "compare.h"
 #include "lsp/command_line.h"
+#include "lsp/json_result.h"
 #include "lsp/output_file.h"
-#include "lsp/print_json.h"
 
 int main(int argc, char** argv) {
   using namespace lsp;
@@ -29,6 +29,7 @@ int main(int argc, char** argv) {
                {{"Options", {"REFERENCE.pfm", "TEST.pfm", "--output FILE", "--factor", "--max-rmse"}}});
   return run_program(kProgram, app, argc, argv, [&] {
     const std::filesystem::path inputs[] = {reference_path, test_path};
+    if (!output.empty()) check_picture_name(output);
     if (!output.empty()) check_output(output, inputs);
     const Picture reference = read_pfm(reference_path);
     const Picture test = read_pfm(test_path);
@@ -47,7 +48,7 @@ int main(int argc, char** argv) {
       // JSON has no infinity; equal pictures have no PSNR.
       json["psnr_db"] =
           std::isfinite(c.psnr_db) ? nlohmann::ordered_json(c.psnr_db) : nlohmann::ordered_json();
-      print_json(json);
+      json_result() = json;
     } else if (!common.quiet) {
       std::cout << "RMSE " << c.rmse << ", mean absolute " << c.mean_absolute << " (" << 100 * c.relative_mean
                 << " % of the mean), PSNR " << c.psnr_db << " dB, " << 100 * far_share

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "lsp/file_ending.h"
 #include "lsp/output_file.h"
 #include "lsp/program.h"
 
@@ -67,14 +68,15 @@ glm::vec3 tone_map(glm::vec3 radiance) {
   return glm::clamp(x * (2.51f * x + 0.03f) / (x * (2.43f * x + 0.59f) + 0.14f), 0.0f, 1.0f);
 }
 
-void write_picture(const std::filesystem::path& path, const Picture& picture, Transfer transfer) {
-  if (path.extension() == ".pfm") {
-    write_file(path, to_pfm(picture));
-  } else if (path.extension() == ".png") {
-    write_file(path, to_png(picture, transfer));
-  } else {
+void check_picture_name(const std::filesystem::path& path) {
+  const std::string ending = file_ending(path);
+  if (ending != ".png" && ending != ".pfm")
     throw Failure(Exit::kUsage, path.string(), "pictures are written as .png or .pfm; choose one of the two");
-  }
+}
+
+void write_picture(const std::filesystem::path& path, const Picture& picture, Transfer transfer) {
+  check_picture_name(path);
+  write_file(path, file_ending(path) == ".pfm" ? to_pfm(picture) : to_png(picture, transfer));
 }
 
 std::string rgba_png(int width, int height, const std::vector<uint8_t>& rgba) {

@@ -28,8 +28,10 @@ enum class Transfer {
   kDisplay,     // values are display light already: sRGB alone
 };
 
-// Writes by the ending of `path`, .pfm or .png; anything else throws lsp::Failure (kUsage). .pfm ignores
-// `transfer` and keeps the floats.
+// Throws lsp::Failure (kUsage) unless `path` ends as pictures do, .pfm or .png, in small letters or capitals.
+void check_picture_name(const std::filesystem::path& path);
+
+// Writes by the ending of `path`, which is checked as above. .pfm ignores `transfer` and keeps the floats.
 void write_picture(const std::filesystem::path& path, const Picture& picture, Transfer transfer);
 
 // The bytes of a .png file of eight bits a channel: red, green, blue and alpha, rows from the top.

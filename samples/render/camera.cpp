@@ -13,6 +13,18 @@
 namespace lsp::sample {
 namespace {
 
+// A light for a hall; radius 0: none.
+struct Lamp {
+  glm::vec3 position{0.0f};
+  float radius = 0.0f;
+  float intensity = 0.0f;  // radiant
+};
+
+struct View {
+  Camera camera;
+  Lamp lamp;  // in the middle of a hall
+};
+
 constexpr float kPi = 3.14159265358979324f;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
@@ -262,6 +274,31 @@ std::optional<View> view_of_hall(const RenderScene& scene, RayTracer& tracer, co
   return view;
 }
 
+// Inside a hall it stands where it sees far, at three tenths of the height; otherwise it looks at the whole
+// from outside and a little above, from in front and to the right unless much more is seen from elsewhere, so
+// near that it fills a picture of `aspect` (width over height). `up`: y or z.
+View default_view(const RenderScene& scene, RayTracer& tracer, glm::vec3 up, float aspect) {
+  const Camera outside = view_of_object(scene, tracer, up, aspect);
+  if (const std::optional<View> hall = view_of_hall(scene, tracer, outside, aspect)) return *hall;
+  return {outside, {}};
+}
+
+// Makes the sky's light suit a scene that default_view has looked at: out in the open everything is darker,
+// and in a hall without light of its own hangs the lamp; then true.
+bool suit(Sky& sky, const Lamp& lamp, const RenderScene& scene) {
+  if (lamp.radius == 0) {
+    // Out in the open nothing takes light away, as walls do: the same sky would be glaring.
+    sky.brightness *= 0.4f;
+    sky.sun_irradiance *= 0.4f;
+    return false;
+  }
+  if (scene.has_emitters()) return false;
+  sky.lamp_position = lamp.position;
+  sky.lamp_radius = lamp.radius;
+  sky.lamp_intensity = glm::vec3(1.0f, 0.9f, 0.75f) * lamp.intensity;
+  return true;
+}
+
 }  // namespace
 
 LspRay Camera::ray(glm::vec2 pixel, int width, int height) const {
@@ -313,26 +350,6 @@ glm::ivec2 parse_size(const std::string& text) {
     throw Failure(Exit::kUsage, "", "--size '" + text + "' is not WIDTHxHEIGHT, each from 1 to 16384");
   }
   return size;
-}
-
-View default_view(const RenderScene& scene, RayTracer& tracer, glm::vec3 up, float aspect) {
-  const Camera outside = view_of_object(scene, tracer, up, aspect);
-  if (const std::optional<View> hall = view_of_hall(scene, tracer, outside, aspect)) return *hall;
-  return {outside, {}};
-}
-
-bool suit(Sky& sky, const Lamp& lamp, const RenderScene& scene) {
-  if (lamp.radius == 0) {
-    // Out in the open nothing takes light away, as walls do: the same sky would be glaring.
-    sky.brightness *= 0.4f;
-    sky.sun_irradiance *= 0.4f;
-    return false;
-  }
-  if (scene.has_emitters()) return false;
-  sky.lamp_position = lamp.position;
-  sky.lamp_radius = lamp.radius;
-  sky.lamp_intensity = glm::vec3(1.0f, 0.9f, 0.75f) * lamp.intensity;
-  return true;
 }
 
 Shot choose_shot(const RenderScene& scene, RayTracer& tracer, const std::string& camera,

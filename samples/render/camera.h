@@ -32,27 +32,6 @@ const char* up_option(const Camera& camera);
 // Parses "WIDTHxHEIGHT", in pixels. Throws lsp::Failure (kUsage).
 glm::ivec2 parse_size(const std::string& text);
 
-// A light for a hall; radius 0: none.
-struct Lamp {
-  glm::vec3 position{0.0f};
-  float radius = 0.0f;
-  float intensity = 0.0f;  // radiant
-};
-
-struct View {
-  Camera camera;
-  Lamp lamp;  // in the middle of a hall
-};
-
-// Inside a hall it stands where it sees far, at three tenths of the height; otherwise it looks at the whole
-// from outside and a little above, from in front and to the right unless much more is seen from elsewhere, so
-// near that it fills a picture of `aspect` (width over height). `up`: y or z.
-View default_view(const RenderScene& scene, RayTracer& tracer, glm::vec3 up, float aspect);
-
-// Makes the sky's light suit a scene that default_view has looked at: out in the open everything is darker,
-// and in a hall without light of its own hangs the lamp; then true.
-bool suit(Sky& sky, const Lamp& lamp, const RenderScene& scene);
-
 // What is looked at, and in which light.
 struct Shot {
   Camera camera;

@@ -11,9 +11,10 @@
 #include "exposure.h"
 #include "heat.h"
 #include "lsp/command_line.h"
+#include "lsp/file_ending.h"
+#include "lsp/json_result.h"
 #include "lsp/lsp_vulkan.h"
 #include "lsp/output_file.h"
-#include "lsp/print_json.h"
 #include "lsp/trace_arguments.hpp"
 #include "renderer.h"
 
@@ -86,20 +87,15 @@ void run_heat(const Arguments& arguments, const CommonOptions& common, const Ren
                                });
   if (show_progress) std::fprintf(stderr, "\r               \r");
   for (const std::string& output : arguments.outputs) {
-    const bool colors = std::filesystem::path(output).extension() == ".png";
+    const bool colors = file_ending(output) == ".png";
     write_picture(output, colors ? in_colors(map) : map.values, Transfer::kDisplay);
   }
   if (common.json) {
-    print_json({{"file", arguments.file},
-                {"outputs", arguments.outputs},
-                {"heat", arguments.heat},
-                {"mode", arguments.mode},
-                {"width", options.width},
-                {"height", options.height},
-                {"samples", options.samples},
-                {"camera", to_string(camera)},
-                {"mean", map.mean},
-                {"white", map.top}});
+    json_result() = {{"file", arguments.file},     {"outputs", arguments.outputs},
+                     {"heat", arguments.heat},     {"mode", arguments.mode},
+                     {"width", options.width},     {"height", options.height},
+                     {"samples", options.samples}, {"camera", to_string(camera)},
+                     {"mean", map.mean},           {"white", map.top}};
   } else if (!common.quiet) {
     std::printf("%s: heat of %s, %d x %d, %u samples: mean %.4g a ray, white is %.4g; camera %s%s\n",
                 arguments.outputs.front().c_str(), arguments.heat.c_str(), options.width, options.height,
@@ -134,38 +130,38 @@ void print_report(const Arguments& arguments, const CommonOptions& common, const
                   const Camera& camera, float stops, const RayTracer& tracer, const RenderReport& report) {
   const double rate = mega(report.indirect_rays, report.indirect_seconds);
   if (common.json) {
-    print_json(
-        {{"file", arguments.file},
-         {"outputs", arguments.outputs},
-         {"effect", arguments.effect},
-         {"mode", arguments.mode},
-         {"near", arguments.trace.near},
-         {"lod", arguments.trace.lod},
-         {"light_quality", arguments.light_quality.empty() ? "as the others" : arguments.light_quality},
-         {"width", options.width},
-         {"height", options.height},
-         {"samples", options.samples},
-         {"bounces", options.bounces},
-         {"denoised", options.denoise},
-         {"camera", to_string(camera)},
-         {"up", camera.up.z > 0 ? "z" : "y"},
-         {"exposure", stops},
-         {"verify", 100.0f * options.verify},
-         {"backend", arguments.backend},
-         {"device", tracer.device()},
-         {"load_path", tracer.load_path()},
-         {"dispatches", tracer.dispatches()},
-         {"seconds", report.seconds},
-         {"primary_rays", report.primary_rays},
-         {"primary_seconds", report.primary_seconds},
-         {"shadow_rays", report.shadow_rays},
-         {"shadow_seconds", report.shadow_seconds},
-         {"indirect_rays", report.indirect_rays},
-         {"indirect_seconds", report.indirect_seconds},
-         {"indirect_mrays_per_second", rate},
-         {"paths", report.paths},
-         {"verified_paths", report.verified_paths},
-         {"mean_luminance", report.mean_luminance}});
+    json_result() = {
+        {"file", arguments.file},
+        {"outputs", arguments.outputs},
+        {"effect", arguments.effect},
+        {"mode", arguments.mode},
+        {"near", arguments.trace.near},
+        {"lod", arguments.trace.lod},
+        {"light_quality", arguments.light_quality.empty() ? "as the others" : arguments.light_quality},
+        {"width", options.width},
+        {"height", options.height},
+        {"samples", options.samples},
+        {"bounces", options.bounces},
+        {"denoised", options.denoise},
+        {"camera", to_string(camera)},
+        {"up", camera.up.z > 0 ? "z" : "y"},
+        {"exposure", stops},
+        {"verify", 100.0f * options.verify},
+        {"backend", arguments.backend},
+        {"device", tracer.device()},
+        {"load_path", tracer.load_path()},
+        {"dispatches", tracer.dispatches()},
+        {"seconds", report.seconds},
+        {"primary_rays", report.primary_rays},
+        {"primary_seconds", report.primary_seconds},
+        {"shadow_rays", report.shadow_rays},
+        {"shadow_seconds", report.shadow_seconds},
+        {"indirect_rays", report.indirect_rays},
+        {"indirect_seconds", report.indirect_seconds},
+        {"indirect_mrays_per_second", rate},
+        {"paths", report.paths},
+        {"verified_paths", report.verified_paths},
+        {"mean_luminance", report.mean_luminance}};
   } else if (!common.quiet) {
     std::printf("%s: %d x %d, %u samples, %s, %s, %s\n", arguments.outputs.front().c_str(), options.width,
                 options.height, options.samples, arguments.effect.c_str(), arguments.mode.c_str(),
@@ -188,10 +184,7 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
   options.width = size.x;
   options.height = size.y;
   for (const std::string& output : arguments.outputs) {
-    const std::filesystem::path ending = std::filesystem::path(output).extension();
-    if (ending != ".png" && ending != ".pfm") {
-      throw Failure(Exit::kUsage, output, "pictures are written as .png or .pfm; choose one of the two");
-    }
+    check_picture_name(output);
     check_output(output);
   }
   const std::optional<float> exposure = parse_exposure(arguments.exposure, !arguments.camera.empty());
@@ -226,7 +219,7 @@ void run(const Arguments& arguments, const CommonOptions& common, const char* pr
       exposure ? *exposure : chosen_exposure(report.surface_luminance, report.bright_luminance);
   for (const std::string& output : arguments.outputs) {
     Picture shown = picture;
-    if (std::filesystem::path(output).extension() == ".png" && !grey) {
+    if (file_ending(output) == ".png" && !grey) {
       for (glm::vec3& pixel : shown.pixels) pixel *= std::exp2(stops);
     }
     write_picture(output, shown, grey ? Transfer::kDisplay : Transfer::kToneMapped);

@@ -10,7 +10,8 @@
 #include <cmath>
 #include <limits>
 
-#include "denoise.h"
+#include "film.h"
+#include "glossy.h"
 #include "sampler.h"
 
 namespace lsp::sample {
@@ -26,14 +27,6 @@ constexpr float kLargestSample = 20.0f;
 
 // The light rays of a point.
 enum LightSlot : size_t { kSkyLight, kSun, kEmitter, kLamp, kLightSlots };
-
-// What a picture is the sum of, kept apart for the denoiser.
-enum Component : uint32_t {
-  kSharp,     // little noise or fine detail: background, emission, sun
-  kSmooth,    // light on diffuse surfaces from everywhere else
-  kMirrored,  // glossy reflections
-  kComponents,
-};
 
 // Pairs of random numbers a sample draws, by purpose. Bounce b adds b times kDimensionsPerBounce.
 enum Dimension : uint32_t {
@@ -92,15 +85,7 @@ class Renderer {
         tracer_(tracer),
         report_(report),
         arena_(options.threads > 0 ? options.threads : tbb::task_arena::automatic),
-        picture_(options.width, options.height) {
-    const size_t pixels = picture_.pixels.size();
-    for (size_t c = 0; c < kComponents; ++c) {
-      sum_[c] = Picture(options.width, options.height);
-      squares_[c].resize(pixels);
-    }
-    albedo_ = guides_.normal = guides_.position = Picture(options.width, options.height);
-    guides_.depth.resize(pixels);
-    met_.resize(pixels);
+        film_(options.width, options.height) {
     order_pixels();
   }
 
@@ -116,92 +101,24 @@ class Renderer {
         sample_ = options_.first_sample + sample;
         for (auto& component : now_) component.assign(count_, glm::vec3(0.0f));
         render_sample();
-        keep_sample();
+        for_each(count_, [&](size_t i) {
+          for (const Component c : {kSharp, kSmooth, kMirrored}) film_.add(order_[first_ + i], c, now_[c][i]);
+        });
         done += 1;
         if (progress) progress(done / total);
       }
     }
-    finish();
-    measure_luminance();
+    film_.average(options_.samples);
+    const float pixel_angle_rad =
+        2.0f * std::tan(camera_.fov_degrees * kPi / 360.0f) / static_cast<float>(options_.height);
+    if (options_.denoise) arena_.execute([&] { film_.denoise(pixel_angle_rad); });
+    Picture picture = film_.picture();
+    film_.measure(picture, report_);
     report_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    return std::move(picture_);
+    return picture;
   }
 
  private:
-  // Adds the wave's sample to the picture's sums.
-  void keep_sample() {
-    for_each(count_, [&](size_t i) {
-      const uint32_t pixel = order_[first_ + i];
-      for (size_t c = 0; c < kComponents; ++c) {
-        const glm::vec3 radiance = now_[c][i];
-        sum_[c].pixels[pixel] += radiance;
-        const float bright = luminance(radiance);
-        squares_[c][pixel] += bright * bright;
-      }
-    });
-  }
-
-  void measure_luminance() {
-    double total = 0;
-    double surface_log = 0;
-    std::vector<float> surfaces;
-    for (size_t i = 0; i < picture_.pixels.size(); ++i) {
-      const float bright = luminance(picture_.pixels[i]);
-      total += static_cast<double>(bright);
-      if (met_[i] == 0) continue;
-      surface_log += std::log(std::max(static_cast<double>(bright), 1e-7));
-      surfaces.push_back(bright);
-    }
-    report_.mean_luminance = total / static_cast<double>(picture_.pixels.size());
-    if (surfaces.empty()) return;
-    report_.surface_luminance = std::exp(surface_log / static_cast<double>(surfaces.size()));
-    const auto bright = surfaces.begin() + static_cast<std::ptrdiff_t>(surfaces.size() * 9 / 10);
-    std::ranges::nth_element(surfaces, bright);
-    report_.bright_luminance = static_cast<double>(*bright);
-  }
-
-  static float luminance(glm::vec3 color) { return glm::dot(color, glm::vec3(0.2126f, 0.7152f, 0.0722f)); }
-
-  // Divides the sums by the samples, denoises if asked for, and adds the components up.
-  void finish() {
-    const float n = static_cast<float>(options_.samples);
-    for (auto& component : sum_) {
-      for (glm::vec3& p : component.pixels) p /= n;
-    }
-    if (options_.denoise) arena_.execute([&] { denoise_components(); });
-    for (size_t i = 0; i < picture_.pixels.size(); ++i) {
-      picture_.pixels[i] = sum_[kSharp].pixels[i] + sum_[kSmooth].pixels[i] + sum_[kMirrored].pixels[i];
-    }
-  }
-
-  void denoise_components() {
-    const float n = static_cast<float>(options_.samples);
-    for (size_t i = 0; i < albedo_.pixels.size(); ++i) {
-      albedo_.pixels[i] = glm::max(albedo_.pixels[i] / n, glm::vec3(1e-3f));
-      const float hits = met_[i];
-      if (hits <= 0) continue;
-      guides_.position.pixels[i] /= hits;
-      guides_.depth[i] /= hits;
-      const float length = glm::length(guides_.normal.pixels[i]);
-      if (length > 0) guides_.normal.pixels[i] /= length;
-    }
-    guides_.pixel_angle_rad =
-        2.0f * std::tan(camera_.fov_degrees * kPi / 360.0f) / static_cast<float>(options_.height);
-    for (const Component c : {kSmooth, kMirrored}) {
-      std::vector<float> variance(met_.size());
-      for (size_t i = 0; i < variance.size(); ++i) {
-        const float mean = luminance(sum_[c].pixels[i]);
-        // The surface's colour is taken out of the light that it has coloured, and put back below.
-        const float colored = c == kSmooth ? luminance(albedo_.pixels[i]) : 1.0f;
-        variance[i] = std::max(squares_[c][i] / n - mean * mean, 0.0f) / (n * colored * colored);
-        if (c == kSmooth) sum_[c].pixels[i] /= albedo_.pixels[i];
-      }
-      sum_[c] = denoise(sum_[c], variance, guides_, c == kSmooth ? 5 : 3);
-      if (c != kSmooth) continue;
-      for (size_t i = 0; i < albedo_.pixels.size(); ++i) sum_[c].pixels[i] *= albedo_.pixels[i];
-    }
-  }
-
   // Pixels in blocks of 8 x 8: neighbours in a batch see the same parts of the scene.
   void order_pixels() {
     for (int by = 0; by < options_.height; by += 8) {
@@ -264,7 +181,7 @@ class Renderer {
     for (uint32_t i = 0; i < count_; ++i) {
       if (std::isfinite(hits_[i].t)) {
         surfaces_.push_back({i, {}, {}});
-        met_[order_[first_ + i]] += 1.0f;
+        film_.add_surface(order_[first_ + i]);
       } else if (options_.effect == Effect::kAmbientOcclusion) {
         add(i, kSharp, glm::vec3(1.0f));
       } else if (wants(Effect::kDirect)) {
@@ -284,12 +201,9 @@ class Renderer {
 
   // Primary rays have unit length, so that t is the distance. A pixel has one surface a sample.
   void keep_guides(const Surface& s, float distance) {
-    const uint32_t pixel = order_[first_ + s.item];
     const bool occlusion = options_.effect == Effect::kAmbientOcclusion;
-    albedo_.pixels[pixel] += occlusion ? glm::vec3(1.0f) : s.point.base_color * (1.0f - s.point.metallic);
-    guides_.normal.pixels[pixel] += s.point.shading_normal;
-    guides_.position.pixels[pixel] += s.point.position;
-    guides_.depth[pixel] += distance;
+    film_.add_guides(order_[first_ + s.item], s.point,
+                     occlusion ? glm::vec3(1.0f) : s.point.base_color * (1.0f - s.point.metallic), distance);
   }
 
   void render_occlusion() {
@@ -389,43 +303,10 @@ class Renderer {
     return ray_from(s.point, above(s.point, direction), kInfinity);
   }
 
-  // One direction of the GGX lobe by visible normals (Heitz 2018); its weight is F G2 / G1.
   LspRay start_glossy(const Surface& s, Path& path) const {
-    const glm::vec3 n = s.point.shading_normal;
-    glm::vec3 t;
-    glm::vec3 b;
-    make_frame(n, t, b);
-    const float alpha = std::max(s.point.roughness * s.point.roughness, 1e-3f);
-    const glm::vec3 v(glm::dot(s.to_eye, t), glm::dot(s.to_eye, b), std::max(glm::dot(s.to_eye, n), 1e-3f));
-    const glm::vec3 stretched = glm::normalize(glm::vec3(alpha * v.x, alpha * v.y, v.z));
-    glm::vec3 t1;
-    glm::vec3 t2;
-    make_frame(stretched, t1, t2);
-    const glm::vec2 u = random(s.item, kGlossyDirection);
-    const float r = std::sqrt(u.x);
-    const float p1 = r * std::cos(2.0f * kPi * u.y);
-    const float q = r * std::sin(2.0f * kPi * u.y);
-    // t1, t2 are any frame here; the half that is seen is chosen along the horizontal direction of the frame.
-    const float blend = 0.5f * (1.0f + stretched.z);
-    const glm::vec3 h1 =
-        stretched.z < 0.9999f ? glm::normalize(glm::cross(glm::vec3(0, 0, 1), stretched)) : t1;
-    const glm::vec3 h2 = glm::cross(stretched, h1);
-    const float p2 = (1.0f - blend) * std::sqrt(std::max(1.0f - p1 * p1, 0.0f)) + blend * q;
-    const glm::vec3 micro =
-        p1 * h1 + p2 * h2 + std::sqrt(std::max(1.0f - p1 * p1 - p2 * p2, 0.0f)) * stretched;
-    const glm::vec3 half =
-        glm::normalize(glm::vec3(alpha * micro.x, alpha * micro.y, std::max(micro.z, 1e-6f)));
-    const glm::vec3 l = 2.0f * glm::dot(v, half) * half - v;
-    const glm::vec3 f0 = glm::mix(glm::vec3(0.04f), s.point.base_color, s.point.metallic);
-    const float grazing = std::pow(1.0f - glm::clamp(glm::dot(v, half), 0.0f, 1.0f), 5.0f);
-    const auto lambda = [&](glm::vec3 w) {
-      const float tan2 = (w.x * w.x + w.y * w.y) / std::max(w.z * w.z, 1e-9f);
-      return 0.5f * (std::sqrt(1.0f + alpha * alpha * tan2) - 1.0f);
-    };
-    const float shadowing = l.z > 0 ? (1.0f + lambda(v)) / (1.0f + lambda(v) + lambda(l)) : 0.0f;
-    path.throughput = (f0 + (1.0f - f0) * grazing) * shadowing;
-    const glm::vec3 direction = glm::normalize(l.x * t + l.y * b + l.z * n);
-    return ray_from(s.point, above(s.point, direction), kInfinity);
+    const GlossyDirection glossy = glossy_direction(s.point, s.to_eye, random(s.item, kGlossyDirection));
+    path.throughput = glossy.weight;
+    return ray_from(s.point, above(s.point, glossy.direction), kInfinity);
   }
 
   void follow_bounce(const lsp_trace_options& options, const lsp_trace_options& light, int bounce) {
@@ -621,15 +502,8 @@ class Renderer {
   RayTracer& tracer_;
   RenderReport& report_;
   tbb::task_arena arena_;
-  Picture picture_;
+  Film film_;
   std::vector<uint32_t> order_;
-
-  // Sums over the samples, by pixel.
-  std::array<Picture, kComponents> sum_;
-  std::array<std::vector<float>, kComponents> squares_;  // of luminance
-  Picture albedo_;
-  Guides guides_;
-  std::vector<float> met_;  // samples that met a surface
 
   // The wave's state, kept from sample to sample for its memory.
   size_t first_ = 0;

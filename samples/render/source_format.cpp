@@ -1,9 +1,8 @@
 #include "source_format.h"
 
-#include <algorithm>
-#include <cctype>
-#include <filesystem>
 #include <nlohmann/json.hpp>
+
+#include "lsp/file_ending.h"
 
 namespace lsp::sample {
 namespace {
@@ -30,10 +29,7 @@ std::set<std::string> source_endings(const lsp_scene& scene) {
   if (!meta.is_object() || sources == meta.end() || !sources->is_array()) return endings;
   for (const nlohmann::json& files : *sources) {
     if (!files.is_array() || files.empty() || !files[0].is_string()) continue;
-    std::string ending = std::filesystem::path(files[0].get<std::string>()).extension().string();
-    std::ranges::transform(ending, ending.begin(),
-                           [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    endings.insert(std::move(ending));
+    endings.insert(file_ending(files[0].get<std::string>()));
   }
   return endings;
 }

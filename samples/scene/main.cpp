@@ -3,8 +3,8 @@
 #include <nlohmann/json.hpp>
 
 #include "lsp/command_line.h"
+#include "lsp/json_result.h"
 #include "lsp/output_file.h"
-#include "lsp/print_json.h"
 #include "scene.h"
 
 int main(int argc, char** argv) {
@@ -33,14 +33,14 @@ int main(int argc, char** argv) {
     write_file(output, bytes);
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
     if (common.json) {
-      print_json({{"file", output},
-                  {"scene", name},
-                  {"triangles", triangle_count(scene)},
-                  {"meshes", scene.meshes.size()},
-                  {"nodes", scene.nodes.size()},
-                  {"materials", scene.materials.size()},
-                  {"bytes", bytes.size()},
-                  {"seconds", seconds.count()}});
+      json_result() = {{"file", output},
+                       {"scene", name},
+                       {"triangles", triangle_count(scene)},
+                       {"meshes", scene.meshes.size()},
+                       {"nodes", scene.nodes.size()},
+                       {"materials", scene.materials.size()},
+                       {"bytes", bytes.size()},
+                       {"seconds", seconds.count()}};
     } else if (!common.quiet) {
       std::cout << output << ": " << name << ", " << triangle_count(scene) << " triangles in "
                 << scene.meshes.size() << " meshes and " << scene.nodes.size() << " nodes, " << bytes.size()

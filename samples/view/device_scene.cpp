@@ -47,10 +47,20 @@ void DeviceScene::plan(const VkPhysicalDeviceLimits& device) {
     if (status == LSP_OK && instances_ != nullptr)
       status =
           lsp_vulkan_place_buffers(&plans_[i], &limits, &pool_bytes_, places_.emplace_back().data(), &error);
+    if (status == LSP_ERROR_LIMIT) refuse_size();
     const std::string number = instances_ != nullptr ? "asset " + std::to_string(i) + ": " : "";
     if (status != LSP_OK) throw Failure(static_cast<Exit>(status), path_, number + error.message);
   }
   for (const uint32_t flags : {0u, LSP_TRACE_APPROXIMATE}) kind({flags, 0, LSP_QUALITY_BALANCED, 0});
+}
+
+// The window's shaders read storage buffers; lsp_vulkan.h has a way through addresses, which lsp-render goes.
+void DeviceScene::refuse_size() const {
+  throw Failure(Exit::kLimit, path_,
+                std::string(instances_ != nullptr ? "its assets have" : "a section has") +
+                    " more bytes than a storage buffer of this device may hold (" +
+                    std::to_string(gpu_.properties.limits.maxStorageBufferRange) +
+                    "): bake with --max-size, or make pictures with lsp-render, which has no such limit");
 }
 
 lsp_vulkan_kind DeviceScene::kind(const lsp_trace_options& options) const {
@@ -155,9 +165,10 @@ GpuBuffer DeviceScene::upload(const std::vector<T>& items, const char* what) {
 
 GpuBuffer DeviceScene::upload(const void* bytes, uint64_t size, const char* what) {
   if (size > gpu_.properties.limits.maxStorageBufferRange) {
-    throw Failure(Exit::kLimit, path_,
-                  std::string("has more ") + what +
-                      " than a buffer of this device may hold; use lsp-render --backend cpu");
+    throw Failure(
+        Exit::kLimit, path_,
+        std::string("has more ") + what +
+            " than a buffer of this device may hold; make pictures with lsp-render, which has no such limit");
   }
   GpuBuffer buffer(gpu_, size, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
                    Memory::kDevice);

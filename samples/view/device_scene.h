@@ -17,7 +17,8 @@ class DeviceScene {
   // together, are larger than the device's buffers may be).
   DeviceScene(Gpu& gpu, const RenderScene& scene);
 
-  // [lsp] What a pipeline for such rays is made of; of instances that of all assets, kInstancesShader.
+  // [lsp] What a pipeline for such rays is made of; of instances that of all assets, whose base structure is
+  // 0.
   lsp_vulkan_kind kind(const lsp_trace_options& options) const;
   // [lsp] Instances: approximate rays are at the dial of these options from now on. Of one file that is in
   // its kind.
@@ -36,6 +37,7 @@ class DeviceScene {
  private:
   using Places = std::array<VkDeviceAddress, LSP_VULKAN_MAX_BUFFERS>;
   void plan(const VkPhysicalDeviceLimits& limits);
+  [[noreturn]] void refuse_size() const;
   template <class Destination>
   void upload_sections(size_t number, const Destination& destination);
   void upload_single();

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "lsp/vk_start.hpp"
+
 namespace lsp::sample {
 namespace {
 
@@ -17,20 +19,6 @@ VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlagBitsEXT
 }
 
 [[noreturn]] void unsupported(const std::string& message) { throw Failure(Exit::kUnsupported, "", message); }
-
-// Better first: a real GPU before the software one.
-int rank(VkPhysicalDeviceType type) {
-  switch (type) {
-    case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:
-      return 0;
-    case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU:
-      return 1;
-    case VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU:
-      return 2;
-    default:
-      return 3;
-  }
-}
 
 }  // namespace
 
@@ -83,14 +71,7 @@ void Gpu::create_instance(bool validation) {
   auto features = vk_make<VkValidationFeaturesEXT>(VK_STRUCTURE_TYPE_VALIDATION_FEATURES_EXT);
   features.enabledValidationFeatureCount = 1;
   features.pEnabledValidationFeatures = &enabled;
-  auto messenger =
-      vk_make<VkDebugUtilsMessengerCreateInfoEXT>(VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT);
-  messenger.messageSeverity =
-      VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT;
-  messenger.messageType =
-      VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_TYPE_GENERAL_BIT_EXT;
-  messenger.pfnUserCallback = on_message;
-  messenger.pUserData = this;
+  VkDebugUtilsMessengerCreateInfoEXT messenger = messenger_info(on_message, this);
   auto info = vk_make<VkInstanceCreateInfo>(VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO);
   info.pApplicationInfo = &application;
   const char* layer = "VK_LAYER_KHRONOS_validation";
@@ -125,7 +106,7 @@ void Gpu::choose_physical() {
   for (const VkPhysicalDevice candidate : devices) {
     VkPhysicalDeviceProperties found;
     vkGetPhysicalDeviceProperties(candidate, &found);
-    if (found.apiVersion < VK_API_VERSION_1_1 || rank(found.deviceType) >= best) continue;
+    if (found.apiVersion < VK_API_VERSION_1_1 || device_rank(found.deviceType) >= best) continue;
     uint32_t families = 0;
     vkGetPhysicalDeviceQueueFamilyProperties(candidate, &families, nullptr);
     std::vector<VkQueueFamilyProperties> queues(families);
@@ -134,7 +115,7 @@ void Gpu::choose_physical() {
       VkBool32 presents = VK_FALSE;
       vkGetPhysicalDeviceSurfaceSupportKHR(candidate, i, surface, &presents);
       if (presents == VK_FALSE || (queues[i].queueFlags & VK_QUEUE_COMPUTE_BIT) == 0) continue;
-      best = rank(found.deviceType);
+      best = device_rank(found.deviceType);
       physical = candidate;
       properties = found;
       family = i;

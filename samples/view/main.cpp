@@ -12,9 +12,10 @@
 #include "exposure.h"
 #include "exposure_meter.h"
 #include "lsp/command_line.h"
+#include "lsp/file_ending.h"
 #include "lsp/instanced_scene.hpp"
+#include "lsp/json_result.h"
 #include "lsp/output_file.h"
-#include "lsp/print_json.h"
 #include "lsp/trace_arguments.hpp"
 #include "picture.h"
 #include "renderer.h"
@@ -155,19 +156,19 @@ void report(const ViewReport& r, const ViewState& state, const Arguments& argume
                                   {"steps", r.steps[part]}};
   };
   if (common.json) {
-    print_json({{"file", arguments.file},
-                {"device", gpu.properties.deviceName},
-                {"effect", kEffects[state.effect]},
-                {"split", state.split},
-                {"dial", dial_name(state.approximate, scene)},
-                {"exposure", state.exposure},
-                {"camera", to_string(state.camera)},
-                {"samples", r.samples},
-                {"exact", half(VIEW_EXACT)},
-                {"approximate", half(VIEW_APPROXIMATE)},
-                {"incomplete", r.incomplete},
-                {"screenshot", arguments.screenshot},
-                {"validation_messages", gpu.messages}});
+    json_result() = {{"file", arguments.file},
+                     {"device", gpu.properties.deviceName},
+                     {"effect", kEffects[state.effect]},
+                     {"split", state.split},
+                     {"dial", dial_name(state.approximate, scene)},
+                     {"exposure", state.exposure},
+                     {"camera", to_string(state.camera)},
+                     {"samples", r.samples},
+                     {"exact", half(VIEW_EXACT)},
+                     {"approximate", half(VIEW_APPROXIMATE)},
+                     {"incomplete", r.incomplete},
+                     {"screenshot", arguments.screenshot},
+                     {"validation_messages", gpu.messages}};
   } else if (!common.quiet) {
     std::printf("%s, %s\n%s\ncamera %s%s\n", arguments.file.c_str(), gpu.properties.deviceName,
                 figures(r, state, scene).c_str(), to_string(state.camera).c_str(), up_option(state.camera));
@@ -197,8 +198,7 @@ float automatic_exposure(const RenderScene& scene, const Sky& sky, const ViewSta
 
 // The file, or a mesh once it is baked.
 std::unique_ptr<RenderScene> open_scene(const std::string& file, const CommonOptions& common) {
-  const std::filesystem::path path(file);
-  if (path.extension() == ".lsp" || is_instanced_scene(file)) return std::make_unique<RenderScene>(path);
+  if (file_ending(file) == ".lsp" || is_instanced_scene(file)) return std::make_unique<RenderScene>(file);
   say(common, file, {"is baked first; to keep that: lsp-bake " + file + " -o scene.lsp"});
   const BakedFile baked(file, common.quiet);
   if (!common.quiet) {
@@ -216,7 +216,7 @@ void say_notes(const Arguments& arguments, const CommonOptions& common, const Re
 }
 
 void run(Arguments& arguments, const CommonOptions& common) {
-  if (!arguments.screenshot.empty() && std::filesystem::path(arguments.screenshot).extension() != ".png")
+  if (!arguments.screenshot.empty() && file_ending(arguments.screenshot) != ".png")
     throw Failure(Exit::kUsage, arguments.screenshot, "screenshots are written as .png; choose such a name");
   if (!arguments.screenshot.empty()) check_output(arguments.screenshot);
   if (!arguments.screenshot.empty() && arguments.frames == 0)

@@ -31,17 +31,20 @@ Described describe(Device& device, const std::vector<const lsp_scene*>& scenes,
                    const lsp_trace_options& options) {
   Described result;
   lsp_error error;
-  std::vector<lsp_vulkan_plan> plans;
+  PoolPlan plan;
   std::vector<lsp_vulkan_asset> assets;
-  const std::vector<SceneBuffers> buffers =
-      SceneBuffers::upload_pool(device, scenes, LSP_USE_EXACT | LSP_USE_APPROXIMATE, false, result.pool);
-  for (size_t i = 0; i < scenes.size(); ++i) {
-    plans.push_back(buffers[i].plan());
-    or_throw(lsp_vulkan_describe_asset(scenes[i], &plans[i], buffers[i].places(), &options,
-                                       &assets.emplace_back(), &error),
+  for (const lsp_scene* scene : scenes) {
+    lsp_vulkan_plan& buffers = plan.buffers.emplace_back();
+    VkDeviceAddress* const places = plan.places.emplace_back().data();
+    or_throw(
+        lsp_vulkan_plan_buffers(scene, LSP_USE_EXACT | LSP_USE_APPROXIMATE, &device.limits, &buffers, &error),
+        error);
+    or_throw(lsp_vulkan_place_buffers(&buffers, &device.limits, &plan.bytes, places, &error), error);
+    or_throw(lsp_vulkan_describe_asset(scene, &buffers, places, &options, &assets.emplace_back(), &error),
              error);
   }
-  or_throw(lsp_vulkan_plan_instances(scenes.data(), plans.data(), static_cast<uint32_t>(plans.size()),
+  SceneBuffers::upload_pool(device, scenes, plan, false, result.pool);
+  or_throw(lsp_vulkan_plan_instances(scenes.data(), plan.buffers.data(), static_cast<uint32_t>(scenes.size()),
                                      &options, &result.kind, &error),
            error);
   result.assets = host_buffer(device, assets.size() * sizeof assets[0], assets.data());

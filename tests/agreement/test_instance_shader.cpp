@@ -362,6 +362,30 @@ TEST(InstancePlan, PlacesAndTheirLimit) {
   EXPECT_EQ(std::string(error.message).rfind("asset 1 is planned with addresses", 0), 0u) << error.message;
 }
 
+// All assets together, or a section of one: the tracer reads through addresses then.
+TEST_F(InstanceShader, WhatNoStorageBufferHoldsIsReadThroughAddresses) {
+  const std::vector<const lsp_scene*> scenes = {&assets().ball->scene(), &assets().soup->scene()};
+  const Instances instances(scenes, places_of(2, 12, 11));
+  lsp_vulkan_limits limits{1u << 27, 0, 65535, 0};
+  uint64_t bytes = 0, largest = 0;
+  for (const lsp_scene* scene : scenes) {
+    lsp_vulkan_plan plan;
+    VkDeviceAddress places[LSP_VULKAN_MAX_BUFFERS];
+    ASSERT_EQ(lsp_vulkan_plan_buffers(scene, LSP_USE_EXACT, &limits, &plan, nullptr), LSP_OK);
+    ASSERT_EQ(lsp_vulkan_place_buffers(&plan, &limits, &bytes, places, nullptr), LSP_OK);
+    for (uint32_t i = 0; i < plan.buffer_count; ++i) largest = std::max(largest, plan.buffers[i].bytes);
+  }
+  ASSERT_GT(largest, lsp_instances_bytes(12));
+  for (const uint64_t range : {bytes - 1, largest - 1}) {
+    SCOPED_TRACE(range);
+    VulkanOptions options;
+    options.max_storage_buffer_range = static_cast<uint32_t>(range);
+    VulkanTracer tracer(options);
+    tracer.load(scenes, LSP_USE_EXACT, LoadPath::kUpload);
+    expect_same_bits(tracer, instances, {});
+  }
+}
+
 TEST_F(InstanceShader, ValidationHasNothingToSay) {
   VulkanOptions options;
   options.validation = true;

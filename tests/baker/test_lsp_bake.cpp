@@ -444,6 +444,37 @@ TEST_F(LspBake, FilesThatAreMissingMakeItStaleOnceTheyAreThere) {
   EXPECT_EQ(validate("b.lsp --mesh a.gltf"), 7);
 }
 
+// Names with what means something else in a rule: they are up to date after the bake, and not once a file
+// changed.
+TEST_F(LspBake, NinjaAndMakeReadTheDepfile) {
+  const std::string scene = "my $cene #1: a";
+  fs::create_directory(folder_ / scene);
+  std::ofstream(folder_ / scene / "b #$:.mtl") << "newmtl x\nKd 1 0 0\n";
+  std::ofstream(folder_ / scene / "b.obj") << "mtllib b #$:.mtl\nusemtl x\n" << read("grid.obj");
+  ASSERT_EQ(run("'" + scene + "/b.obj' -o 'o $ #:.lsp' --depth 3 --depfile a.d"), 0);
+  std::ofstream(folder_ / "Makefile") << "o\\ $$\\ \\#\\:.lsp:\n\tfalse\n-include a.d\n";
+  std::ofstream(folder_ / "build.ninja") << "rule bake\n  command = touch 'o $$ #:.lsp'\n  depfile = a.d\n"
+                                            "build o$ $$$ #$:.lsp: bake\n";
+  const auto is_new = [&](const std::string& tool) {
+    return tool == "make" ? shell("make -q >/dev/null 2>&1", folder_) == 0
+                          : shell("ninja -n | grep -q 'no work'", folder_) == 0;
+  };
+  for (const std::string tool : {"make", "ninja"}) {
+    if (shell("command -v " + tool + " >/dev/null") != 0) GTEST_SKIP() << "no " << tool;
+    SCOPED_TRACE(tool);
+    ASSERT_EQ(shell(tool == "ninja" ? "ninja >/dev/null" : "touch 'o $ #:.lsp'", folder_), 0);
+    EXPECT_TRUE(is_new(tool));
+    for (const char* changed : {"b.obj", "b #$:.mtl"}) {
+      const fs::path path = folder_ / scene / changed;
+      const fs::file_time_type before = fs::last_write_time(path);
+      fs::last_write_time(path, fs::file_time_type::clock::now() + std::chrono::hours(1));
+      EXPECT_FALSE(is_new(tool)) << changed;
+      fs::last_write_time(path, before);
+      EXPECT_TRUE(is_new(tool)) << changed;
+    }
+  }
+}
+
 TEST_F(LspBake, KeepsWhatTheErrorAllows) {
   ASSERT_EQ(run("grid.obj -o a.lsp --base bvh --max-error 20 --json"), 0);
   EXPECT_LE(nlohmann::json::parse(read("out"))["error"]["wrong_percent"], 20.0);

@@ -9,7 +9,7 @@
 #include "context.h"
 #include "lsp/command_line.h"
 #include "lsp/in_chunks.hpp"
-#include "lsp/print_json.h"
+#include "lsp/json_result.h"
 #include "machine.h"
 #include "timing.h"
 
@@ -193,7 +193,7 @@ void run(const Arguments& arguments, const CommonOptions& common) {
   const Report& report = running.report();
   if (show) std::cerr << "\r\033[K";
   if (common.json) {
-    print_json(to_json(report));
+    json_result() = to_json(report);
   } else if (!common.quiet) {
     for (const std::string& answer : report.answers) std::cout << answer << "\n";
     for (const std::string& warning : report.warnings) std::cout << "warning: " << warning << "\n";

@@ -127,7 +127,7 @@ TEST(Program, SeveralFilesInOneRun) {
   const Json schema = Json::parse(file);
   EXPECT_EQ(misfit(schema, json["files"][0], ""), "");
   EXPECT_EQ(json["files"][1]["exit"], 2);
-  EXPECT_NE(json["files"][1]["message"].get<std::string>().find("cannot be opened"), std::string::npos);
+  EXPECT_NE(json["files"][1]["error"].get<std::string>().find("cannot be opened"), std::string::npos);
   EXPECT_EQ(misfit(schema, json["files"][2], ""), "");
   EXPECT_EQ(run(validate + " " + valid + " " + valid + " --mesh /dev/null").exit, 1);
 }

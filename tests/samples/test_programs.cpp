@@ -315,6 +315,23 @@ TEST_F(Programs, DevicesGetThePictureInPieces) {
   EXPECT_EQ(usual.at("dispatches"), 0u) << "the CPU's";
 }
 
+TEST_F(Programs, EndingsMayBeInCapitals) {
+  for (const std::string ending : {".png", ".PNG", ".pfm", ".Pfm"})
+    ASSERT_EQ(test::shell("lsp-render " + file("spheres.lsp") + " -o " + file("capitals" + ending) +
+                          " --quiet --size 16x9 --samples 1"),
+              0);
+  EXPECT_EQ(test::read_bytes(file("capitals.png")), test::read_bytes(file("capitals.PNG")));
+  EXPECT_EQ(test::read_bytes(file("capitals.pfm")), test::read_bytes(file("capitals.Pfm")));
+  EXPECT_EQ(test::shell("lsp-compare " + file("capitals.pfm") + " " + file("capitals.Pfm") + " -o " +
+                        file("difference.PNG") + " --quiet"),
+            0);
+  for (const std::string name : {"x.jpg", "png", "x.png.gz"})
+    EXPECT_EQ(test::shell("lsp-compare " + file("capitals.pfm") + " " + file("capitals.pfm") + " -o " + name +
+                          " 2>/dev/null"),
+              1)
+        << name;
+}
+
 TEST_F(Programs, HeatIsWhereTablesLoseAndWorkGoes) {
   const auto total = [](const Picture& picture) {
     double sum = 0;

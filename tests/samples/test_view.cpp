@@ -17,6 +17,7 @@
 
 #include "bake_first.h"
 #include "controls.h"
+#include "device_scene.h"
 #include "exposure_meter.h"
 #include "lsp/vulkan_device.hpp"
 #include "shell.h"
@@ -320,6 +321,34 @@ TEST_F(View, OptionsReachTheShaders) {
   EXPECT_GT(difference(shot("bvh.lsp", "--split 0"), shot("bvh.lsp", "--split 0 --lod 1"), 0, kWidth).mean,
             0.0);
   EXPECT_GT(mean(shot("cells.lsp", "--exposure 1")), mean(shot("cells.lsp", "--exposure 0")));
+}
+
+// What the device's storage buffers cannot hold is an error that says what can be done.
+TEST_F(View, RefusesWhatNoBufferHolds) {
+  ASSERT_EQ(glfwInit(), GLFW_TRUE);
+  glfwWindowHint(GLFW_CLIENT_API, GLFW_NO_API);
+  GLFWwindow* window = glfwCreateWindow(kWidth, kHeight, "test", nullptr, nullptr);
+  ASSERT_NE(window, nullptr);
+  {
+    Gpu gpu(window, false);
+    gpu.properties.limits.maxStorageBufferRange = 4096;
+    for (const char* name : {"cells.lsp", "placed.json"}) {
+      SCOPED_TRACE(name);
+      const RenderScene scene(file(name));
+      try {
+        const DeviceScene on_device(gpu, scene);
+        ADD_FAILURE() << "loaded";
+      } catch (const Failure& failure) {
+        EXPECT_EQ(failure.exit(), Exit::kLimit);
+        EXPECT_EQ(failure.file(), file(name));
+        const std::string message = failure.what();
+        for (const char* part : {"4096", "--max-size", "lsp-render"})
+          EXPECT_NE(message.find(part), std::string::npos) << message;
+      }
+    }
+  }
+  glfwDestroyWindow(window);
+  glfwTerminate();
 }
 
 // In one process: samples add up while nothing changes, the line and the window's size move, and the

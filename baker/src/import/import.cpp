@@ -7,33 +7,23 @@
 
 #include "import/readers.h"
 #include "import/source_file.h"
+#include "lsp/file_ending.h"
 #include "lsp/program.h"
 
 namespace lsp {
-namespace {
-
-std::string extension_of(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  for (char& c : extension) {
-    if (c >= 'A' && c <= 'Z') c = char(c - 'A' + 'a');
-  }
-  return extension;
-}
-
-}  // namespace
 
 bool is_gltf(const std::filesystem::path& path) {
-  const std::string extension = extension_of(path);
-  return extension == ".gltf" || extension == ".glb";
+  const std::string ending = file_ending(path);
+  return ending == ".gltf" || ending == ".glb";
 }
 
 void read_mesh_file(const std::filesystem::path& path, MeshBuilder& builder, PoseRequest& pose) {
   if (is_gltf(path)) return read_gltf(path, builder, pose);
-  const std::string extension = extension_of(path);
-  if (extension == ".obj") return read_obj(path, builder);
-  if (extension == ".ply") return read_ply(path, builder);
-  if (extension == ".stl") return read_stl(path, builder);
-  if (extension == ".off") return read_off(path, builder);
+  const std::string ending = file_ending(path);
+  if (ending == ".obj") return read_obj(path, builder);
+  if (ending == ".ply") return read_ply(path, builder);
+  if (ending == ".stl") return read_stl(path, builder);
+  if (ending == ".off") return read_off(path, builder);
   throw Failure(Exit::kUnsupported, path.string(),
                 "is of no format known here, give .gltf, .glb, .obj, .ply, .stl or .off");
 }

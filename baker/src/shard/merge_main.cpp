@@ -10,8 +10,8 @@
 #include "figures.h"
 #include "file.h"
 #include "lsp/command_line.h"
+#include "lsp/json_result.h"
 #include "lsp/output_file.h"
-#include "lsp/print_json.h"
 #include "shard/join.h"
 #include "timer.h"
 
@@ -89,7 +89,7 @@ MeasuredError finish(Baked& baked, PartSettings& settings, const std::string& fi
   return error;
 }
 
-Exit run(const Arguments& a) {
+void run(const Arguments& a) {
   check_output(a.output, a.parts);
   std::unique_ptr<tbb::global_control> control;
   if (a.threads)
@@ -129,10 +129,9 @@ Exit run(const Arguments& a) {
   bar.clear();
 
   if (a.common.json)
-    print_json(report_json(a, done));
+    json_result() = report_json(a, done);
   else if (!a.common.quiet)
     print_report(a, done);
-  return Exit::kDone;
 }
 
 }  // namespace
@@ -151,5 +150,5 @@ int main(int argc, char** argv) {
   add_common_options(app, "lsp-merge", a.common);
   arrange_help(app, "lsp-merge room.*.part -o room.lsp",
                {{"Options", {"PART", "--output FILE", "--threads"}}});
-  return run_program("lsp-merge", app, argc, argv, [&] { return run(a); });
+  return run_program("lsp-merge", app, argc, argv, [&] { run(a); });
 }

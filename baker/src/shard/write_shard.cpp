@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "figures.h"
-#include "lsp/print_json.h"
+#include "lsp/json_result.h"
 #include "policy.h"
 #include "provenance.h"
 #include "shard/part.h"
@@ -65,7 +65,7 @@ void write_shard(const Arguments& a, const ShardInput& input, const WriteOptions
   const uint64_t bytes = write_part(a.output, baked, shard, {meta, accuracy_of(a), !a.no_exact, write});
   const Done done = {shard, baked, bytes, timer()};
   if (a.common.json)
-    print_json(report_json(a, input, done));
+    json_result() = report_json(a, input, done);
   else if (!a.common.quiet)
     print_report(a, input, done);
 }

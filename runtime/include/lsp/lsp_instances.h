@@ -78,7 +78,7 @@ LSP_API lsp_status lsp_instances_build(const lsp_scene* const* assets, uint32_t 
                                        const lsp_instance* instances, uint32_t count, void* memory,
                                        uint64_t bytes, lsp_instances* out, lsp_error* error);
 
-/* Traces rays[0, count), in scene space, into hits[0, count), in this thread, with some 80 KiB of its stack.
+/* Traces rays[0, count), in scene space, into hits[0, count), in this thread, with some 160 KiB of its stack.
  * Only instances whose mask shares a bit with `mask` are seen. Hits as lsp_trace gives them, and
  *   - flags from bit 8 on are the instance's number: LSP_HIT_INSTANCE(hit);
  *   - primitive, u and v are those of the asset;

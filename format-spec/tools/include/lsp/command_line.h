@@ -16,6 +16,7 @@
 #include <type_traits>
 
 #include "lsp/help_text.h"
+#include "lsp/json_result.h"
 #include "lsp/layout.h"
 #include "lsp/program.h"
 
@@ -36,7 +37,10 @@ inline void add_common_options(CLI::App& app, const char* program, CommonOptions
                            std::to_string(LSP_VERSION_MAJOR) + "." + std::to_string(LSP_VERSION_MINOR),
                        "Print the versions of program and format and exit");
   app.add_flag("--quiet", options.quiet, "Print nothing but errors");
-  app.add_flag("--json", options.json, "Print one JSON object on standard output");
+  app.add_flag(
+      "--json", options.json,
+      "Print one JSON object on standard output: what was done, exit (the exit code) and, where that is "
+      "not 0, error (what is wrong)");
 }
 
 // An option that is a number of bytes, as 512MB or 2GiB.
@@ -68,38 +72,78 @@ inline void refuse_nan(const CLI::App& app) {
   }
 }
 
-// Parses, runs `body` and returns its exit code: that of the Exit or int it returns, 0 if it returns nothing.
-// Turns what is thrown into a message on standard error.
+// How a program ended; `error` is empty where nothing is to be said.
+struct Ending {
+  Exit exit = Exit::kDone;
+  std::string file = {};  // that `error` is about, where it is about one
+  std::string error = {};
+};
+
+// Whether --json is among the words: asked of these, as an error in one keeps CLI11 from reading the next.
+inline bool asks_for_json(int argc, char** argv) {
+  for (int i = 1; i < argc && std::string_view(argv[i]) != "--"; ++i)
+    if (std::string_view(argv[i]) == "--json") return true;
+  return false;
+}
+
+// Parses, runs `body` and says how that ended. `says_itself`: it was asked for --help or --version.
 template <typename Body>
-int run_program(const char* program, CLI::App& app, int argc, char** argv, Body&& body) {
+Ending parse_and_run(const char* program, CLI::App& app, int argc, char** argv, Body& body,
+                     bool& says_itself) {
   try {
     try {
       app.parse(argc, argv);
-    } catch (const CLI::Success& e) {  // --help, --version
+    } catch (const CLI::Success& e) {
+      says_itself = true;
       app.exit(e);
-      check_standard_output();
-      return static_cast<int>(Exit::kDone);
+      return {};
     }
     refuse_nan(app);
-    int exit = 0;
-    if constexpr (std::is_void_v<decltype(body())>)
+    if constexpr (std::is_void_v<decltype(body())>) {
       body();
-    else
-      exit = static_cast<int>(body());
+      return {};
+    } else {
+      return body();
+    }
+  } catch (const CLI::ParseError& e) {
+    return {Exit::kUsage, "", std::string(e.what()) + "; see " + program + " --help"};
+  } catch (const Failure& e) {
+    return {e.exit(), e.file(), e.what()};
+  } catch (const std::bad_alloc&) {
+    return {Exit::kLimit, "", "out of memory; use a smaller input or a machine with more memory"};
+  } catch (const std::exception& e) {
+    return {Exit::kInternal, "", std::string("internal error: ") + e.what() + "; please report it"};
+  }
+}
+
+// The object of --json, whatever has been put into json_result().
+inline void print_result(const char* program, const Ending& ending) {
+  nlohmann::ordered_json json = {{"program", program}, {"version", kProgramVersion}};
+  if (!json_result().is_null()) json.update(json_result());
+  json["exit"] = static_cast<int>(ending.exit);
+  if (!ending.file.empty() && !json.contains("file")) json["file"] = ending.file;
+  if (!ending.error.empty()) json["error"] = ending.error;
+  print_json(json);
+}
+
+// Runs `body`, which returns nothing or an Ending, once the arguments are parsed, and returns the exit code.
+// What is thrown becomes a message on standard error and a member of --json's object.
+template <typename Body>
+int run_program(const char* program, CLI::App& app, int argc, char** argv, Body&& body) {
+  const auto complain = [&](const Ending& ending) {
+    if (!ending.error.empty())
+      std::cerr << program << ": " << (ending.file.empty() ? "" : ending.file + ": ") << ending.error << "\n";
+    return static_cast<int>(ending.exit);
+  };
+  bool says_itself = false;
+  const Ending ending = parse_and_run(program, app, argc, argv, body, says_itself);
+  const int exit = complain(ending);
+  try {
+    if (asks_for_json(argc, argv) && !says_itself) print_result(program, ending);
     check_standard_output();
     return exit;
-  } catch (const CLI::ParseError& e) {
-    std::cerr << program << ": " << e.what() << "; see " << program << " --help\n";
-    return static_cast<int>(Exit::kUsage);
   } catch (const Failure& e) {
-    std::cerr << program << ": " << (e.file().empty() ? "" : e.file() + ": ") << e.what() << "\n";
-    return static_cast<int>(e.exit());
-  } catch (const std::bad_alloc&) {
-    std::cerr << program << ": out of memory; use a smaller input or a machine with more memory\n";
-    return static_cast<int>(Exit::kLimit);
-  } catch (const std::exception& e) {
-    std::cerr << program << ": internal error: " << e.what() << "; please report it\n";
-    return static_cast<int>(Exit::kInternal);
+    return exit != 0 ? exit : complain({e.exit(), e.file(), e.what()});
   }
 }
 

@@ -10,7 +10,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <filesystem>
 #include <fstream>
 #include <initializer_list>
@@ -21,17 +20,14 @@
 #include <vector>
 
 #include "lsp/failures.hpp"
+#include "lsp/file_ending.h"
 #include "lsp/instances.hpp"
 #include "lsp/scene_file.hpp"
 
 namespace lsp {
 
 // Whether a program that is given `path` takes it for a scene as JSON: by its ending.
-inline bool is_instanced_scene(const std::string& path) {
-  std::string ending = std::filesystem::path(path).extension().string();
-  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return ending == ".json";
-}
+inline bool is_instanced_scene(const std::string& path) { return file_ending(path) == ".json"; }
 
 // The scene with its assets opened and its instances ready for rays. Errors are thrown as lsp::Failure with
 // the file's name and the place in it: kFile, kInvalid, kUnsupported for another version of the scene or of

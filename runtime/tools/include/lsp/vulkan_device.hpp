@@ -29,8 +29,9 @@ struct VulkanOptions {
   bool validation = false;  // the Khronos layer, core and synchronization; see validation_messages
   bool addresses = false;   // read sections through buffer addresses even where other ways would do
   bool discrete = false;    // treat the device as a discrete GPU: staging buffers, never an import on its own
-  size_t passes_from =
-      4096;  // rays at once, from which on cells are traced in passes: lsp_vulkan_record_passes
+  uint32_t max_storage_buffer_range = 0xFFFFFFFFu;  // or the device's, where that is less
+  // Rays at once, from which on cells are traced in passes: lsp_vulkan_record_passes.
+  size_t passes_from = 4096;
 };
 
 struct VulkanTrace {
@@ -52,8 +53,8 @@ class VulkanTracer {
 
   explicit VulkanTracer(const VulkanOptions& options = {});
   ~VulkanTracer();
-  VulkanTracer(VulkanTracer&&) noexcept;
-  VulkanTracer& operator=(VulkanTracer&&) noexcept;
+  VulkanTracer(const VulkanTracer&) = delete;
+  VulkanTracer& operator=(const VulkanTracer&) = delete;
 
   // Puts `scene` on the device for `uses` (LSP_USE_*), in place of the one before, and traces a ray to see
   // that it works. The scene's bytes must stay mapped until the next load or the end of the tracer: imported

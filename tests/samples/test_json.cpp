@@ -1,0 +1,139 @@
+// --json of every program that fails: one object on standard output, which says the exit code and what is
+// wrong.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "lsp/program.h"
+#include "picture.h"
+#include "shell.h"
+
+namespace lsp::sample {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct Outcome {
+  int exit = -1;
+  Json json;
+  std::string errors;
+};
+
+class JsonOfFailures : public ::testing::Test {
+ protected:
+  Outcome run(const std::string& line) {
+    Outcome run;
+    run.exit = test::shell(line + " >out 2>err", folder_.path());
+    const std::string out = test::read_bytes(folder_.path() / "out");
+    run.json = Json::parse(out, nullptr, false);
+    run.errors = test::read_bytes(folder_.path() / "err");
+    EXPECT_TRUE(run.json.is_object()) << line << "\n" << out;
+    return run;
+  }
+
+  // Runs PROGRAM --json WORDS, which has to fail with this exit code and with this in its message.
+  Outcome expect_failure(const std::string& program, const std::string& words, int exit,
+                         const std::string& message) {
+    SCOPED_TRACE(program + " " + words);
+    Outcome failed = run(program + " --json " + words);
+    EXPECT_EQ(failed.exit, exit) << failed.errors;
+    if (!failed.json.is_object()) return failed;
+    EXPECT_EQ(failed.json.value("program", ""), program);
+    EXPECT_EQ(failed.json.value("version", ""), kProgramVersion);
+    EXPECT_EQ(failed.json.value("exit", -1), exit);
+    const std::string error = failed.json.value("error", "");
+    EXPECT_NE(error.find(message), std::string::npos) << error;
+    EXPECT_NE(failed.errors.find(error), std::string::npos) << failed.errors;
+    return failed;
+  }
+
+  void write(const std::string& name, const std::string& text) {
+    std::ofstream(folder_.path() / name, std::ios::binary) << text;
+  }
+
+  test::TemporaryFolder folder_;
+};
+
+// What each is asked for that it cannot do.
+struct Case {
+  const char* program;
+  const char* words;
+  int exit;
+  const char* message;
+};
+constexpr Case kCases[] = {
+    {"lsp-bake", "none.obj -o out.lsp", 2, "cannot be"},
+    {"lsp-bench", "none.obj -o report", 2, "does not exist"},
+    {"lsp-compare", "none.pfm none.pfm", 2, "cannot be"},
+    {"lsp-demo-report", "none -o page.html", 2, "cannot be read"},
+    {"lsp-info", "none.lsp", 2, "cannot be"},
+    {"lsp-merge", "none.part -o out.lsp", 2, "cannot be"},
+    {"lsp-render", "none.lsp -o out.png", 2, "cannot be"},
+    {"lsp-sample-scene", "no/such/folder/out.glb", 2, "cannot be"},
+    {"lsp-trace", "none.lsp --rays none.bin --hits out.bin", 2, "cannot be"},
+    {"lsp-validate", "none.lsp", 2, "cannot be"},
+    {"lsp-view", "none.lsp", 2, "cannot be"},
+};
+
+TEST_F(JsonOfFailures, EveryProgram) {
+  std::set<std::string> asked;
+  for (const Case& c : kCases) {
+    if (!std::filesystem::exists(std::filesystem::path(LSP_BIN_DIR) / c.program)) continue;
+    asked.insert(c.program);
+    const Outcome failed = expect_failure(c.program, c.words, c.exit, c.message);
+    EXPECT_TRUE(failed.json.contains("file")) << c.program;
+    expect_failure(c.program, std::string(c.words) + " --no-such-option", 1, "--no-such-option");
+  }
+  for (const auto& entry : std::filesystem::directory_iterator(LSP_BIN_DIR)) {
+    const std::string program = entry.path().filename().string();
+    EXPECT_TRUE(!program.starts_with("lsp-") || asked.contains(program)) << program << " has no case";
+  }
+}
+
+// --json is heard wherever it stands, and a word after -- is a file.
+TEST_F(JsonOfFailures, JsonIsHeardWhereverItStands) {
+  const Outcome failed = run("lsp-info none.lsp --memory-limit much --json");
+  EXPECT_EQ(failed.exit, 1);
+  EXPECT_EQ(failed.json.value("exit", -1), 1);
+  EXPECT_NE(failed.json.value("error", "").find("--memory-limit"), std::string::npos);
+  EXPECT_EQ(test::shell("lsp-info -- --json >out 2>err", folder_.path()), 2);
+  EXPECT_EQ(test::read_bytes(folder_.path() / "out"), "");
+}
+
+// What was found out is there, too, in the same object.
+TEST_F(JsonOfFailures, FiguresAndErrorAreOneObject) {
+  Picture picture(2, 2);
+  write_picture((folder_.path() / "black.pfm").string(), picture, Transfer::kDisplay);
+  picture.pixels[0] = glm::vec3(1);
+  write_picture((folder_.path() / "other.pfm").string(), picture, Transfer::kDisplay);
+  const Outcome failed = expect_failure("lsp-compare", "black.pfm other.pfm --max-rmse 0.1", 7, "RMSE");
+  EXPECT_GT(failed.json.value("rmse", 0.0), 0.1);
+  const Outcome done = run("lsp-compare --json black.pfm black.pfm --max-rmse 0.1");
+  EXPECT_EQ(done.exit, 0);
+  EXPECT_EQ(done.json.value("exit", -1), 0);
+  EXPECT_FALSE(done.json.contains("error"));
+
+  write("no.lsp", "no such format");
+  const Outcome judged = expect_failure("lsp-validate", "no.lsp", 3, "do not use it");
+  EXPECT_EQ(judged.json.value("verdict", ""), "invalid");
+  const Outcome several = expect_failure("lsp-validate", "no.lsp none.lsp", 3, "2 of 2 files");
+  EXPECT_EQ(several.json["files"].size(), 2u);
+  expect_failure("lsp-validate", "--rules", 1, "Markdown");
+}
+
+// An error that cannot be printed leaves the exit code that it has.
+TEST_F(JsonOfFailures, StandardOutputIsFull) {
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
+  EXPECT_EQ(test::shell("lsp-sample-scene --json out.glb --scene plane >/dev/full 2>err", folder_.path()), 2);
+  EXPECT_NE(test::read_bytes(folder_.path() / "err").find("standard output: cannot be written"),
+            std::string::npos);
+  EXPECT_EQ(test::shell("lsp-validate --json none.lsp none.lsp none.lsp >/dev/full 2>err", folder_.path()),
+            2);
+  EXPECT_EQ(test::shell("lsp-info --json --no-such-option >/dev/full 2>err", folder_.path()), 1);
+}
+
+}  // namespace
+}  // namespace lsp::sample
