@@ -488,7 +488,9 @@ TEST(CellsInPasses, SameBitsOfDamagedFiles) {
   {
     const SceneFile file(path);
     std::vector<LspHit> one(rays.size()), passes(rays.size());
-    VulkanTracer tracer;
+    VulkanOptions options;
+    options.passes_from = 1;
+    VulkanTracer tracer(options);
     tracer.load(file.scene(), LSP_USE_APPROXIMATE);
     for (const float loss : {0.0f, 5.0f}) {
       tracer.trace(tables_but(loss), rays, one, true);

@@ -124,7 +124,7 @@ LSP_END(LspHit)
 /* How many there are, the last of the last kind. In the queue there are four words for each, how many rays wait for it
  * and a VkDispatchIndirectCommand of the work groups that take them; behind these two lists of rays, of passes with
  * an even number and with an odd one. */
-#define LSP_VULKAN_PASSES 9u
+#define LSP_VULKAN_PASSES 5u
 #define LSP_VULKAN_QUEUE_HEAD (4u * LSP_VULKAN_PASSES) /* words */
 
 /* Push constants, compute stage, from offset 0: rays [first, first + count) of the buffers. */

@@ -31,7 +31,7 @@ struct VulkanOptions {
   bool discrete = false;    // treat the device as a discrete GPU: staging buffers, never an import on its own
   uint32_t max_storage_buffer_range = 0xFFFFFFFFu;  // or the device's, where that is less
   // Rays at once, from which on cells are traced in passes: lsp_vulkan_record_passes.
-  size_t passes_from = 4096;
+  size_t passes_from = 8192;
 };
 
 struct VulkanTrace {
