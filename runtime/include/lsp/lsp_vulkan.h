@@ -252,10 +252,12 @@ LSP_API void lsp_vulkan_record_trace(const lsp_vulkan_functions* functions, VkCo
  * end. Same hits, on lavapipe 1.05 to 1.2 times as fast; worth its dispatches from some ten
  * thousand rays on. */
 
-/* Usage and bytes of the buffer in which so many rays wait: the queue. */
+/* Usage of the queue, the buffer in which rays wait. */
 #define LSP_VULKAN_QUEUE_USAGE                                                \
   (VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT | \
    VK_BUFFER_USAGE_TRANSFER_DST_BIT)
+
+/* Bytes of a queue for so many rays at once. */
 LSP_API VkDeviceSize lsp_vulkan_queue_bytes(uint32_t rays);
 
 /* Whether rays of this kind may wait: through cells, at another dial than LSP_DIAL_TABLES. */
