@@ -26,7 +26,8 @@
  * may end loops early, and then only memory tells, see lsp/bvh.h. */
 uint lsp_stack_ref[LSP_CELL_STACK];
 
-/* How far the ray has come: it enters `cell` at t, by a side across `axis`, -1 where it begins there. */
+/* How far the ray has come: it enters `cell` at t, by a side across `axis`, -1 where it begins there. Between passes
+ * runtime/vulkan/trace_passes.comp keeps this in memory: what is added here is added there. */
 struct LspWalk {
   LspBest best;
   uint ref; /* LSP_LEAF_BIT and the filled cell that it is to be traced exactly in; LSP_NONE: it is answered */
