@@ -45,27 +45,18 @@ class Pipelines {
   Pipelines& operator=(const Pipelines&) = delete;
   VkPipeline get(lsp_vulkan_plan plan, bool counting, const lsp_vulkan_kind& kind) {
     plan.base_structure = kind.base_structure;
-    VkPipeline& pipeline = made_[{kind.base_structure, plan.addresses, counting, kind.flags, kind.parts}];
-    if (pipeline != VK_NULL_HANDLE) return pipeline;
-    size_t bytes = 0;
-    const uint32_t* words = lsp_vulkan_trace_spirv(&plan, counting ? 1 : 0, &bytes);
-    return pipeline = create(words, bytes, kind);
+    return find({kind.base_structure, plan.addresses, counting, kind.flags, kind.parts}, kind,
+                [&](size_t* bytes) { return lsp_vulkan_trace_spirv(&plan, counting ? 1 : 0, bytes); });
   }
   // The same of a pass, by kind.pass; it does not count.
   VkPipeline get_pass(const lsp_vulkan_kind& kind) {
-    VkPipeline& pipeline = made_[{kPasses + kind.pass, kind.addresses, false, kind.flags, kind.parts}];
-    if (pipeline != VK_NULL_HANDLE) return pipeline;
-    size_t bytes = 0;
-    const uint32_t* words = lsp_vulkan_passes_spirv(&kind, &bytes);
-    return pipeline = create(words, bytes, kind);
+    return find({kPasses + kind.pass, kind.addresses, false, kind.flags, kind.parts}, kind,
+                [&](size_t* bytes) { return lsp_vulkan_passes_spirv(&kind, bytes); });
   }
   // The same of instances, whose assets need these parts of the shader.
   VkPipeline get_instances(bool counting, const lsp_vulkan_kind& kind) {
-    VkPipeline& pipeline = made_[{kInstances, kind.addresses, counting, kind.flags, kind.parts}];
-    if (pipeline != VK_NULL_HANDLE) return pipeline;
-    size_t bytes = 0;
-    const uint32_t* words = lsp_vulkan_instances_spirv(&kind, counting ? 1 : 0, &bytes);
-    return pipeline = create(words, bytes, kind);
+    return find({kInstances, kind.addresses, counting, kind.flags, kind.parts}, kind,
+                [&](size_t* bytes) { return lsp_vulkan_instances_spirv(&kind, counting ? 1 : 0, bytes); });
   }
 
  private:
@@ -73,15 +64,24 @@ class Pipelines {
   static constexpr uint32_t kInstances = 0;
   static constexpr uint32_t kPasses = 100;
 
-  VkPipeline create(const uint32_t* words, size_t bytes, lsp_vulkan_kind kind) {
+  // What is traced, by base structure or as above; addresses, counting, flags and parts.
+  using Key = std::tuple<uint32_t, uint32_t, bool, uint32_t, uint32_t>;
+
+  // The pipeline made before, or one of the words that `spirv` answers.
+  template <typename Spirv>
+  VkPipeline find(const Key& key, lsp_vulkan_kind kind, Spirv&& spirv) {
+    VkPipeline& pipeline = made_[key];
+    if (pipeline != VK_NULL_HANDLE) return pipeline;
     kind.stack = stack_;
-    return shader_.create_pipeline(words, bytes, kind);
+    size_t bytes = 0;
+    const uint32_t* words = spirv(&bytes);
+    return pipeline = shader_.create_pipeline(words, bytes, kind);
   }
 
   Device& device_;
   TraceShader& shader_;
   uint32_t stack_;
-  std::map<std::tuple<uint32_t, uint32_t, bool, uint32_t, uint32_t>, VkPipeline> made_;
+  std::map<Key, VkPipeline> made_;
 };
 
 // A scene on the device.
