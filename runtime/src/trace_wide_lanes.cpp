@@ -3,14 +3,16 @@
 // asked for.
 //
 // The triangle test is that of lsp/traverse.h, operation by operation: a lane has the bits of a single
-// triangle. The boxes are not: a plane lo + q * step is met at q * (step / d) + (lo / d - o / d), fused where
-// the machine can. What a ray hits does not depend on it, nor on the order in which children are visited (see
+// triangle. The boxes are not: for a ray alone a plane lo + q * step is met at
+// q * (step / d) + (lo / d - o / d), fused where the machine can, and for a group at (lo + q * step) / d - o
+// / d. What a ray hits does not depend on it, nor on the order in which children are visited (see
 // lsp_triangle; any-hit rays keep to the order of the file), as long as no box is missed whose triangle would
 // be hit. Rays are made ready a vector at a time, lsp_setup across lanes. Rounding, with the words of
 // lsp/traverse.h: along the axis (o / d) is off by u max|o|, lo / d by u (max|o| + R), their sum and step / d
 // by u R and 2 u R, q times that and the sum by 3 u R: 8 u R and 2 u max|o| beside the 5 u R of the triangle,
-// where a box is grown by 16 u R + 4 u max|o|. Where a product might overflow, in scenes or from origins
-// beyond 2^40, rays are traced by the text of single ones.
+// where a box is grown by 16 u R + 4 u max|o|; of a group q * step is off by 2 u R, its sum with lo and that
+// over d by u (max|o| + R) each, the last sum by u R: 5 u R and 3 u max|o|. Where a product might overflow,
+// in scenes or from origins beyond 2^40, rays are traced by the text of single ones.
 #include "trace_wide_lanes.h"
 
 #include <algorithm>
@@ -24,10 +26,12 @@
 
 // Without vectors there is the loop of trace_wide.cpp.
 #if HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_EMU128
+#include "ray_order.h"
 #include "trace_loops.h"
 #include "trace_subset.h"
 #include "trace_variant.h"
 #include "wide_found-inl.h"
+#include "wide_nodes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace lsp {
@@ -41,398 +45,62 @@ struct Text {
 #undef LSP_WIDE
 };
 
-constexpr size_t kChildren = LSP_WIDE_CHILDREN;
-using D8 = hn::CappedTag<float, kChildren>;
-using V8 = hn::Vec<D8>;
-constexpr D8 d8;
-constexpr size_t kBoxes = hn::MaxLanes(D8());  // 8, or 4 twice; rays are made ready as many at a time
-constexpr size_t kParts = kChildren / kBoxes;
-
-// All children but one of every node on a path wait, and a mark below them.
-constexpr uint32_t kStack = LSP_MAX_STACK * (kChildren - 1) + 1;
-
-// Beyond these products of reciprocals and positions may overflow.
-constexpr float kTame = 0x1p40f;
-
-// The larger; `than` where x is no number.
-HWY_INLINE V8 larger(V8 x, V8 than) {
-#if HWY_ARCH_X86
-  return hn::Max(x, than);
-#else
-  return hn::IfThenElse(hn::Lt(than, x), x, than);
-#endif
-}
-HWY_INLINE V8 smaller(V8 x, V8 than) {
-#if HWY_ARCH_X86
-  return hn::Min(x, than);
-#else
-  return hn::IfThenElse(hn::Lt(x, than), x, than);
-#endif
+Best no_hit_before(float tmax) {
+  Best best{};
+  best.t = tmax;
+  best.triangle = LSP_NONE;
+  return best;
 }
 
-// By the axes along which a ray goes up, a bit each: bytes of the planes that it meets first.
-constexpr uint8_t kPlanes[8][3] = {{24, 32, 40}, {0, 32, 40}, {24, 8, 40}, {0, 8, 40},
-                                   {24, 32, 16}, {0, 32, 16}, {24, 8, 16}, {0, 8, 16}};
-
-// Rays made ready, a lane each, of which every ray then has its rows: what boxes and triangles take of
-// lsp_setup, operation by operation.
-struct Batch {
-  using Rows = float[kBoxes][4];  // x, y, z, and zero
-  using Values = float[kBoxes];
-  // For boxes: where a plane is met is plane * inverse + base, of those met first and of those met last.
-  HWY_ALIGN Rows inverse, first_base, last_base;
-  // For triangles, the ray's axis last.
-  HWY_ALIGN Rows origin, shear, direction;
-  HWY_ALIGN Values tmin, tmax;
-  HWY_ALIGN uint32_t axis[kBoxes];
-  HWY_ALIGN uint32_t forward[kBoxes];  // axes along which the ray goes up, a bit each
-  uint32_t ready;                      // of the others nothing else is set: they are invalid, or not tame
-};
-
-// One of them, on its way.
-struct Ready {
-  V8 inverse, first_base, last_base;  // in every block of four lanes
-  const uint8_t *first, *last;  // by axis the planes that are met first and last: byte of LspWideNode.planes
-  float tmin, tmax;
-  const float *origin, *shear, *direction;
-  size_t axis;
-  Bytes rotation;
-  const LspRay* given;
-
-  HWY_INLINE Ready(const Batch& b, size_t i, const LspRay& ray)
-      : inverse(hn::LoadDup128(d8, b.inverse[i])),
-        first_base(hn::LoadDup128(d8, b.first_base[i])),
-        last_base(hn::LoadDup128(d8, b.last_base[i])),
-        first(kPlanes[b.forward[i]]),
-        last(kPlanes[7 - b.forward[i]]),
-        tmin(b.tmin[i]),
-        tmax(b.tmax[i]),
-        origin(b.origin[i]),
-        shear(b.shear[i]),
-        direction(b.direction[i]),
-        axis(b.axis[i]),
-        rotation(hn::Load(hn::Repartition<uint8_t, D4>(), kRotations[axis])),
-        given(&ray) {}
-};
-
-// What is waiting, of closest rays a child of a node: where it is entered, and 8 * node + child. Of any-hit
-// rays all children of a node that are left, a bit each. What they refer to is looked up when it is their
-// turn: most never have one.
-struct Waiting {
-  union {
-    float t;
-    uint32_t children;
-  } of;
-  uint32_t node;
-};
-constexpr uint32_t kNoNode = LSP_NONE;
-
-class Tracer {
+// Closest rays, one after the other, children from the nearest on.
+class Closest {
  public:
-  explicit Tracer(const lsp_scene& scene)
-      : scene_(scene),
-        nodes_(scene.wide_nodes),
-        node_count_(scene.header->wide_node_count),
-        triangle_count_(scene.header->triangle_count),
-        most_(scene.header->max_steps) {
-    const lsp_float3 lo = scene.header->bounds_min, hi = scene.header->bounds_max;
-    stack_[0] = {{-HUGE_VALF}, kNoNode};
-    if (!is_tame(lsp_vec3(lo)) || !is_tame(lsp_vec3(hi))) most_largest_ = 0;
-  }
-
-  template <bool kAny>
-  HWY_INLINE void trace(const LspRay* rays, LspHit* hits, uint64_t count, uint32_t flags) {
-    for (uint64_t first = 0; first < count; first += kBoxes) {
-      const uint64_t left = count - first;
-      const size_t here = left < kBoxes ? static_cast<size_t>(left) : kBoxes;
-      make_ready(rays + first, here);
-      for (size_t i = 0; i < here; ++i) {
-        const uint64_t k = first + i;
-        if ((batch_.ready >> i & 1u) != 0)
-          trace_one<kAny>(Ready(batch_, i, rays[k]), static_cast<uint32_t>(k), hits[k]);
-        else
-          hits[k] = trace_singly(rays[k], flags);
-      }
-      if (found_.size() >= kLanes) finish(rays, hits, count, flags);
-    }
-    finish(rays, hits, count, flags);
-  }
-
- private:
-  HWY_INLINE void finish(const LspRay* rays, LspHit* hits, uint64_t count, uint32_t flags) {
-    found_.answer(
-        {scene_, rays, hits, static_cast<uint32_t>(count), (flags & LSP_TRACE_OCCLUSION) != 0, false});
-  }
-
-  template <bool kAny>
-  HWY_INLINE void trace_one(const Ready& r, uint32_t number, LspHit& hit) {
-    Best best{};
-    best.t = r.tmax;
-    best.triangle = LSP_NONE;
-    const bool complete = node_count_ == 0 || walk<kAny>(r, best);
-    const uint32_t flags = complete ? 0 : LSP_HIT_INCOMPLETE;
-    if (best.triangle != LSP_NONE) {
-      found_.add(scene_, number, best.triangle, best.t, best.u, best.v, flags);
-    } else {
-      hit = Text::lsp_no_hit();
-      hit.flags = flags;
-    }
-  }
-
-  static bool is_tame(const vec3& v) { return Text::lsp_largest(v) < kTame; }
-
-  // Invalid rays, and those whose products may overflow.
-  LspHit trace_singly(const LspRay& ray, uint32_t flags) const {
-    LspHit hit;
-    trace_wide(scene_, flags, 0, &ray, &hit, 1, nullptr);
-    return hit;
-  }
-
-  struct P8 {
-    V8 x, y, z;
-  };
-  // Rays as lanes: the fields of LspRay.
-  struct Rays {
-    P8 origin, direction;
-    V8 tmin, tmax;
-  };
-  static HWY_INLINE Rays load(const LspRay* rays, size_t count) {
-    LspRay padded[kBoxes];
-    if (count < kBoxes) {
-      for (size_t i = 0; i < kBoxes; ++i) padded[i] = rays[i < count ? i : count - 1];
-      rays = padded;
-    }
-    // Of half of them in turn: origin and tmin in even lanes, direction and tmax in odd ones.
-    V8 low[4], high[4], even[4], odd[4];
-    hn::LoadInterleaved4(d8, &rays[0].origin.x, low[0], low[1], low[2], low[3]);
-    hn::LoadInterleaved4(d8, &rays[kBoxes / 2].origin.x, high[0], high[1], high[2], high[3]);
-    for (size_t k = 0; k < 4; ++k) {
-      even[k] = hn::ConcatEven(d8, high[k], low[k]);
-      odd[k] = hn::ConcatOdd(d8, high[k], low[k]);
-    }
-    return {{even[0], even[1], even[2]}, {odd[0], odd[1], odd[2]}, even[3], odd[3]};
-  }
-
-  static HWY_INLINE V8 largest_of(V8 x, V8 y, V8 z) { return hn::Max(hn::Max(x, y), z); }
-  static HWY_INLINE V8 reciprocal(V8 d) {
-    const V8 one = hn::Set(d8, 1.0f);
-    const auto is_zero = hn::Eq(d, hn::Zero(d8));
-    return hn::IfThenElse(is_zero, hn::Set(d8, 1.2089258e24f), hn::Div(one, hn::IfThenElse(is_zero, one, d)));
-  }
-  static HWY_INLINE void store(const P8& v, Batch::Rows& to) {
-    hn::StoreInterleaved4(v.x, v.y, v.z, hn::Zero(d8), d8, to[0]);
-  }
-
-  // lsp_setup of as many rays as there are lanes, or fewer.
-  HWY_INLINE void make_ready(const LspRay* from, size_t count) {
-    const hn::RebindToUnsigned<D8> du;
-    const auto set_u = [&](uint32_t x) HWY_ATTR { return hn::Set(du, x); };
-    const Rays rays = load(from, count);
-    const P8 o = rays.origin, d = rays.direction;
-    const V8 mx = hn::Abs(d.x), my = hn::Abs(d.y), mz = hn::Abs(d.z);
-    const V8 largest = largest_of(mx, my, mz);
-    const V8 far_out = largest_of(hn::Abs(o.x), hn::Abs(o.y), hn::Abs(o.z));
-    // A NaN is ordered to nothing; the largest of several may have lost one.
-    const auto is_number =
-        hn::And(hn::And(hn::Eq(d.x, d.x), hn::Eq(d.y, d.y)), hn::And(hn::Eq(o.x, o.x), hn::Eq(o.y, o.y)));
-    const auto is_tame =
-        hn::And(hn::Lt(far_out, hn::Set(d8, most_largest_)), hn::And(hn::Eq(d.z, d.z), hn::Eq(o.z, o.z)));
-    const auto is_direction =
-        hn::And(hn::Lt(largest, hn::Set(d8, HUGE_VALF)), hn::Ge(largest, hn::Set(d8, 0x1p-126f)));
-    batch_.ready = mask_bits(
-        d8, hn::And(hn::And(is_number, is_tame), hn::And(is_direction, hn::Le(rays.tmin, rays.tmax))));
-
-    const auto exponent = hn::Min(hn::ShiftRight<23>(hn::BitCast(du, largest)), set_u(253));
-    const V8 shrink = hn::BitCast(d8, hn::ShiftLeft<23>(hn::Sub(set_u(254), exponent)));
-    const V8 to_scaled = hn::BitCast(d8, hn::ShiftLeft<23>(exponent));
-    const V8 step = hn::Mul(hn::BitCast(d8, set_u(1)), to_scaled), most = hn::Set(d8, LSP_FLOAT_MAX);
-    hn::Store(hn::Add(hn::Mul(rays.tmin, to_scaled), step), d8, batch_.tmin);
-    hn::Store(hn::Min(hn::Sub(hn::Mul(hn::Min(rays.tmax, most), to_scaled), step), most), d8, batch_.tmax);
-
-    const auto scaled = [&](V8 x) HWY_ATTR {
-      const V8 s = hn::Mul(x, shrink);
-      return hn::IfThenZeroElse(hn::Lt(hn::Abs(s), hn::Set(d8, 8.6736174e-19f)), s);
-    };
-    const P8 direction = {scaled(d.x), scaled(d.y), scaled(d.z)};
-    set_slabs(o, {reciprocal(direction.x), reciprocal(direction.y), reciprocal(direction.z)}, far_out);
-
-    const auto at_x = hn::And(hn::Ge(mx, my), hn::Ge(mx, mz)),
-               at_y = hn::AndNot(hn::Ge(mx, my), hn::Ge(my, mz));
-    const auto rotated = [&](const P8& v) HWY_ATTR {
-      return P8{hn::IfThenElse(at_x, v.y, hn::IfThenElse(at_y, v.z, v.x)),
-                hn::IfThenElse(at_x, v.z, hn::IfThenElse(at_y, v.x, v.y)),
-                hn::IfThenElse(at_x, v.x, hn::IfThenElse(at_y, v.y, v.z))};
-    };
-    const P8 p = rotated(direction);
-    store(p, batch_.direction);
-    store(rotated(o), batch_.origin);
-    store({hn::Div(p.x, p.z), hn::Div(p.y, p.z), hn::Div(hn::Set(d8, 1.0f), p.z)}, batch_.shear);
-    const auto mask_u = [&](auto mask) HWY_ATTR { return hn::RebindMask(du, mask); };
-    hn::Store(hn::IfThenZeroElse(mask_u(at_x), hn::IfThenElse(mask_u(at_y), set_u(1), set_u(2))), du,
-              batch_.axis);
-  }
-
-  // Boxes are grown by moving the origin: origin_plus and origin_minus.
-  HWY_INLINE void set_slabs(const P8& o, const P8& inverse, V8 far_out) {
-    const hn::RebindToUnsigned<D8> du;
-    const lsp_float3 lo = scene_.header->bounds_min, hi = scene_.header->bounds_max;
-    const auto reach_of = [&](float from, float to, V8 x) HWY_ATTR {
-      return hn::Max(hn::Abs(hn::Sub(hn::Set(d8, from), x)), hn::Abs(hn::Sub(hn::Set(d8, to), x)));
-    };
-    const V8 reach =
-        largest_of(reach_of(lo.x, hi.x, o.x), reach_of(lo.y, hi.y, o.y), reach_of(lo.z, hi.z, o.z));
-    const V8 err =
-        hn::Add(hn::Mul(reach, hn::Set(d8, 9.5367432e-7f)), hn::Mul(far_out, hn::Set(d8, 2.3841858e-7f)));
-    auto forward = hn::Zero(du);
-    const auto bases = [&](V8 x, V8 by, uint32_t bit, V8& first, V8& last) HWY_ATTR {
-      const auto up = hn::Gt(by, hn::Zero(d8));
-      const V8 plus = hn::Neg(hn::Mul(hn::Add(x, err), by)), minus = hn::Neg(hn::Mul(hn::Sub(x, err), by));
-      first = hn::IfThenElse(up, plus, minus);
-      last = hn::IfThenElse(up, minus, plus);
-      forward = hn::Or(forward, hn::IfThenElseZero(hn::RebindMask(du, up), hn::Set(du, bit)));
-    };
-    P8 first, last;
-    bases(o.x, inverse.x, 1, first.x, last.x);
-    bases(o.y, inverse.y, 2, first.y, last.y);
-    bases(o.z, inverse.z, 4, first.z, last.z);
-    store(inverse, batch_.inverse);
-    store(first, batch_.first_base);
-    store(last, batch_.last_base);
-    hn::Store(forward, du, batch_.forward);
-  }
-
-  static HWY_INLINE V8 planes_at(const uint8_t* bytes) {
-    const hn::Rebind<uint8_t, D8> d_bytes;
-    const hn::RebindToSigned<D8> d_int;
-    return hn::ConvertTo(d8, hn::PromoteTo(d_int, hn::LoadU(d_bytes, bytes)));
-  }
-  static HWY_INLINE V8 row_of(const float* row) {
-    alignas(16) static constexpr uint32_t kThree[4] = {~0u, ~0u, ~0u, 0};
-    // What else is in the row would be a denormal.
-    const hn::RebindToUnsigned<D8> du;
-    return hn::And(hn::LoadDup128(d8, row), hn::BitCast(d8, hn::LoadDup128(du, kThree)));
-  }
-
-  // Children of a node that the ray hits between tmin and tmax, a bit each, and where it enters them. To a
-  // ray from far away boxes that are inside out are as wide as others: there may be no child.
-  static HWY_INLINE uint32_t hit_children(const LspWideNode& node, const Ready& r, V8 tmin, V8 tmax,
-                                          float* entries) {
-    const V8 lo = row_of(&node.lo.x);
-    const V8 unit = hn::Mul(row_of(&node.step.x), r.inverse);
-    const V8 near = hn::MulAdd(lo, r.inverse, r.first_base), far = hn::MulAdd(lo, r.inverse, r.last_base);
-    const auto* bytes = reinterpret_cast<const uint8_t*>(node.planes);
-    uint32_t hits = 0;
-    for (size_t part = 0; part < kParts; ++part, bytes += kBoxes) {
-      const V8 first_x =
-          hn::MulAdd(planes_at(bytes + r.first[0]), hn::Broadcast<0>(unit), hn::Broadcast<0>(near));
-      const V8 first_y =
-          hn::MulAdd(planes_at(bytes + r.first[1]), hn::Broadcast<1>(unit), hn::Broadcast<1>(near));
-      const V8 first_z =
-          hn::MulAdd(planes_at(bytes + r.first[2]), hn::Broadcast<2>(unit), hn::Broadcast<2>(near));
-      const V8 last_x =
-          hn::MulAdd(planes_at(bytes + r.last[0]), hn::Broadcast<0>(unit), hn::Broadcast<0>(far));
-      const V8 last_y =
-          hn::MulAdd(planes_at(bytes + r.last[1]), hn::Broadcast<1>(unit), hn::Broadcast<1>(far));
-      const V8 last_z =
-          hn::MulAdd(planes_at(bytes + r.last[2]), hn::Broadcast<2>(unit), hn::Broadcast<2>(far));
-      const V8 first = larger(first_z, larger(first_y, larger(first_x, tmin)));
-      const V8 last = smaller(last_z, smaller(last_y, smaller(last_x, tmax)));
-      hn::Store(first, d8, entries + part * kBoxes);
-      hits |= mask_bits(d8, hn::Le(first, last)) << (part * kBoxes);
-    }
-    return hits;
-  }
-
-  static HWY_INLINE uint32_t child_of(const LspWideNode& node, uint32_t number) {
-    return reinterpret_cast<const uint16_t*>(node.children)[number];
-  }
-
-  // lsp_triangle of a leaf's, four at a time.
-  HWY_NOINLINE void hit_leaf(const LspWideNode& node, uint32_t child, const Ready& r, Best& best) const {
-    uint32_t first = (node.triangle_first + (child & LSP_WIDE_LEAF_FIRST_MASK)) & LSP_LEAF_FIRST_MASK;
-    uint32_t count = (child >> LSP_WIDE_LEAF_COUNT_SHIFT & LSP_LEAF_COUNT_MASK) + 1;
-    if (first >= triangle_count_ || count > triangle_count_ - first) return;  // of a damaged file
-    for (; count > kLeafLanes; count -= kLeafLanes, first += kLeafLanes) hit_four(first, kLeafLanes, r, best);
-    hit_four(first, count, r, best);
-  }
-
-  HWY_INLINE void hit_four(uint32_t first, uint32_t count, const Ready& r, Best& best) const {
-    // Where there are fewer, what follows is read with them and not heeded.
-    const LspTriangle* triangles = scene_.triangles + first;
-    LspTriangle copies[kLeafLanes];
-    if (triangle_count_ - first < kLeafLanes) [[unlikely]]
-      triangles = copy_last(first, copies);
-    const LspTriangle* const records[kLeafLanes] = {triangles, triangles + 1, triangles + 2, triangles + 3};
-    const auto number_of = [&](uint32_t lane) HWY_ATTR { return first + lane; };
-    hit_triangles<Text>(scene_, records, count, {r.origin, r.shear, r.direction, r.tmin, r.rotation, r.given},
-                        number_of, best);
-  }
-
-  // The file's last triangles, from `first` on, and as many more as make four.
-  HWY_NOINLINE const LspTriangle* copy_last(uint32_t first, LspTriangle* copies) const {
-    for (uint32_t i = 0; i < kLeafLanes; ++i)
-      copies[i] = scene_.triangles[first + i < triangle_count_ ? first + i : triangle_count_ - 1];
-    return copies;
-  }
+  explicit Closest(const Tree<Text>& tree) : tree_(tree) { stack_[0] = {{-HUGE_VALF}, kNoNode}; }
 
   // From the root on. False: the file's bounds are wrong.
-  template <bool kAny>
-  HWY_INLINE bool walk(const Ready& r, Best& best) {
+  HWY_INLINE bool walk(const Lone& r, Best& best) {
     const V8 tmin = hn::Set(d8, r.tmin);
-    uint32_t left = most_, at = 0;
-    const LspWideNode* node = nodes_;
+    uint32_t left = tree_.most_steps();
+    const LspWideNode* node = tree_.nodes();
     Waiting* top = stack_ + 1;
     for (;;) {
       if (left == 0) return false;
       --left;
       HWY_ALIGN float t[kChildren];
-      ask_for_children(*node);
+      tree_.ask_for_children(*node);
       uint32_t hits = hit_children(*node, r, tmin, hn::Set(d8, best.t), t);
       uint32_t child = LSP_WIDE_NO_CHILD;
       if (hits != 0) {
         const auto first = static_cast<uint32_t>(std::countr_zero(hits));
         hits &= hits - 1;
         if (top > stack_ + kStack - kChildren) return false;
-        if constexpr (kAny) {
-          *top = {{.children = hits}, at};
-          top += hits != 0 ? 1 : 0;
-          child = child_of(*node, first);
-        } else {
-          child = child_of(*node, hits == 0 ? first : push_farther(*node, at, t, first, hits, top));
-        }
-      } else if (!pop<kAny>(best.t, top, node, child)) {
+        child = Tree<Text>::child_of(*node, hits == 0 ? first : push_farther(*node, t, first, hits, top));
+      } else if (!pop(best.t, top, node, child)) {
         return true;
       }
       // What is below.
       for (;;) {
         if ((child & LSP_WIDE_NODE_BIT) != 0) {
-          const uint32_t number = child & ~LSP_WIDE_NODE_BIT;
-          at = node->node_first + number;
-          // Where it lies is known sooner from where the first child does.
-          node = advance(nodes_ + node->node_first, number);
-          if (child != LSP_WIDE_NO_CHILD && at < node_count_) break;
+          if (const LspWideNode* below = tree_.below(*node, child)) {
+            node = below;
+            break;
+          }
         } else {
           if (left == 0) return false;
           --left;
-          hit_leaf(*node, child, r, best);
-          if (kAny && best.triangle != LSP_NONE) return true;
+          tree_.hit_leaf(*node, child, r.rows, best);
         }
-        if (!pop<kAny>(best.t, top, node, child)) return true;
+        if (!pop(best.t, top, node, child)) return true;
       }
     }
   }
 
-  // The product has 32 bits: then it is not made one with another of 64.
-  static HWY_INLINE const LspWideNode* advance(const LspWideNode* first, uint32_t number) {
-    static_assert(sizeof(LspWideNode) * LSP_WIDE_NO_CHILD < 0xFFFFFFFFu);
-    const uint32_t bytes = number * uint32_t{sizeof(LspWideNode)};
-    return reinterpret_cast<const LspWideNode*>(reinterpret_cast<const uint8_t*>(first) + bytes);
-  }
-
+ private:
   // Of children `first` and those of `hits`, entered at t: the nearest is returned, the others wait, the
   // farthest lowest.
-  HWY_INLINE uint32_t push_farther(const LspWideNode& node, uint32_t at, const float* t, uint32_t first,
-                                   uint32_t hits, Waiting*& top) {
+  HWY_INLINE uint32_t push_farther(const LspWideNode& node, const float* t, uint32_t first, uint32_t hits,
+                                   Waiting*& top) {
+    const auto number = static_cast<uint32_t>(&node - tree_.nodes()) << 3;
     const Waiting* const bottom = top;
     uint32_t nearest = first;
     do {
@@ -443,77 +111,247 @@ class Tracer {
       nearest = is_nearer ? child : nearest;
       Waiting* place = top++;
       for (; place > bottom && place[-1].of.t < t[other]; --place) *place = place[-1];
-      *place = {{.t = t[other]}, at << 3 | other};
-      ask_for(node, child_of(node, other));
+      *place = {{.t = t[other]}, number | other};
+      tree_.ask_for(node, Tree<Text>::child_of(node, other));
     } while (hits != 0);
     return nearest;
   }
 
-  // Before it is known which of them are hit: of leaves and of nodes those that are likely to be (lines of
-  // memory; children lie in the order of what they are worth to any-hit rays).
-  HWY_INLINE void ask_for_children(const LspWideNode& node) const {
-    const auto ask = [](const void* array, uint64_t bytes, uint32_t lines) HWY_ATTR {
-      const uintptr_t first = reinterpret_cast<uintptr_t>(array) + bytes;
-      for (uint32_t i = 0; i < lines; ++i) __builtin_prefetch(reinterpret_cast<const void*>(first + 64 * i));
+  // Takes what waits on top of the stack, unless it is behind best_t. False: nothing.
+  HWY_INLINE bool pop(float best_t, Waiting*& top, const LspWideNode*& node, uint32_t& child) const {
+    --top;
+    while (top->of.t > best_t) --top;
+    const uint32_t waiting = top->node;
+    if (waiting == kNoNode) return false;
+    node = tree_.nodes() + (waiting >> 3);
+    child = Tree<Text>::child_of(*node, waiting & 7);
+    return true;
+  }
+
+  const Tree<Text>& tree_;
+  Waiting stack_[kStack];
+};
+
+// Any-hit rays, a group together: a node is brought near and decoded once for all that visit it, and only a
+// ray that is left alone in a subtree goes on by itself. Every ray visits the nodes and leaves that it would
+// visit alone, in their order, which is the file's. (Tsakok, "Faster
+// Incoherent Rays: Multi-BVH Ray Stream Tracing", 2009.)
+class AnyHit {
+ public:
+  explicit AnyHit(const Tree<Text>& tree) : tree_(tree) { stack_[0].node = kNoNode; }
+
+  // Rays, a bit each of `alive`, from the root on. Those that hit something leave `alive`, by found(ray,
+  // best). False: the file's bounds are wrong.
+  template <class FoundBy>
+  HWY_INLINE bool walk(const Batch& batch, const LspRay* rays, uint32_t& alive, FoundBy found) {
+    uint32_t left = tree_.most_steps(), here = alive;
+    const LspWideNode* node = tree_.nodes();
+    Waiting* top = stack_ + 1;
+    const auto keep = [&](uint32_t ray, const Best& best) HWY_ATTR {
+      if (best.triangle == LSP_NONE) return;
+      found(ray, best);
+      alive ^= 1u << ray;
     };
-    ask(scene_.triangles, uint64_t{node.triangle_first} * sizeof(LspTriangle), 3);
-    ask(nodes_, uint64_t{node.node_first} * sizeof(LspWideNode), 2);
-  }
-
-  // What waits is read later, if it is: it comes nearer meanwhile. Sponza 1.14 times as fast with it, the
-  // bunny, whose tree is in the cache, the same.
-  HWY_INLINE void ask_for(const LspWideNode& node, uint32_t child) const {
-    static_assert(sizeof(LspWideNode) == 2 * sizeof(LspTriangle));
-    const bool is_node = (child & LSP_WIDE_NODE_BIT) != 0;
-    const uint32_t index = is_node ? node.node_first + (child & ~LSP_WIDE_NODE_BIT)
-                                   : node.triangle_first + (child & LSP_WIDE_LEAF_FIRST_MASK);
-    const auto array =
-        is_node ? reinterpret_cast<uintptr_t>(nodes_) : reinterpret_cast<uintptr_t>(scene_.triangles);
-    const uintptr_t first = array + (size_t{index} << (is_node ? 1 : 0)) * sizeof(LspTriangle);
-    __builtin_prefetch(reinterpret_cast<const void*>(first));
-    __builtin_prefetch(reinterpret_cast<const void*>(first + sizeof(LspWideNode) - 1));
-  }
-
-  // Takes what waits on top of the stack: a child of a node. False: nothing.
-  template <bool kAny>
-  HWY_INLINE bool pop(float best_t, Waiting*& top, const LspWideNode*& node, uint32_t& child) {
-    if constexpr (kAny) {
-      Waiting& group = top[-1];
-      if (group.node == kNoNode) return false;
-      node = nodes_ + group.node;
-      child = child_of(*node, static_cast<uint32_t>(std::countr_zero(group.of.children)));
-      group.of.children &= group.of.children - 1;
-      top -= group.of.children == 0 ? 1 : 0;
-    } else {
-      --top;
-      while (top->of.t > best_t) --top;
-      const uint32_t waiting = top->node;
-      if (waiting == kNoNode) return false;
-      node = nodes_ + (waiting >> 3);
-      child = child_of(*node, waiting & 7);
+    while (here != 0) {
+      if ((here & (here - 1)) == 0) {
+        const auto i = static_cast<uint32_t>(std::countr_zero(here));
+        Best best = no_hit_before(batch.tmax[i]);
+        if (!walk_alone(Lone(batch, i, rays[i]), node, top, left, best)) return false;
+        keep(i, best);
+      } else {
+        if (left == 0 || top > stack_ + kStack - kChildren) return false;
+        --left;
+        push_children(*node, batch, here, top);
+      }
+      // What waits on top.
+      for (;;) {
+        --top;
+        if (top->node == kNoNode) return true;
+        here = top->of.rays & alive;
+        if (here == 0) continue;
+        node = tree_.nodes() + (top->node >> 3);
+        const uint32_t child = Tree<Text>::child_of(*node, top->node & 7);
+        if ((child & LSP_WIDE_NODE_BIT) != 0) {
+          const LspWideNode* below = tree_.below(*node, child);
+          if (below == nullptr) continue;
+          node = below;
+          break;
+        }
+        if (left == 0) return false;
+        --left;
+        for (; here != 0; here &= here - 1) {
+          const auto i = static_cast<uint32_t>(std::countr_zero(here));
+          Best best = no_hit_before(batch.tmax[i]);
+          tree_.hit_leaf(*node, child, batch.rows(i, rays[i]), best);
+          keep(i, best);
+        }
+      }
     }
     return true;
   }
 
-  const lsp_scene& scene_;
-  const LspWideNode* nodes_;
-  const uint32_t node_count_, triangle_count_, most_;
-  float most_largest_ = kTame;  // coordinate of an origin; none, where the scene's are not tame
-  Batch batch_;
-  Found<kBoxes + kLanes> found_;
+ private:
+  HWY_INLINE void push_children(const LspWideNode& node, const Batch& batch, uint32_t here, Waiting*& top) {
+    tree_.ask_for_children(node);
+    HWY_ALIGN uint32_t by_child[kChildren];
+    const auto number = static_cast<uint32_t>(&node - tree_.nodes()) << 3;
+    for (uint32_t left = hit_children(node, batch, here, by_child); left != 0;) {
+      const uint32_t child = 31u - static_cast<uint32_t>(std::countl_zero(left));
+      left ^= 1u << child;
+      *top++ = {{.rays = by_child[child]}, number | child};
+      tree_.ask_for(node, Tree<Text>::child_of(node, child));
+    }
+  }
+
+  // A ray from a node on, until it hits something; what waits goes above `top`. False: the file's bounds are
+  // wrong.
+  HWY_NOINLINE bool walk_alone(const Lone& r, const LspWideNode* node, Waiting* top, uint32_t& left,
+                               Best& best) {
+    const V8 tmin = hn::Set(d8, r.tmin), tmax = hn::Set(d8, r.tmax);
+    *top++ = {{.children = 0}, kNoNode};
+    for (;;) {
+      if (left == 0 || top == stack_ + kStack) return false;
+      --left;
+      HWY_ALIGN float t[kChildren];
+      tree_.ask_for_children(*node);
+      uint32_t hits = hit_children(*node, r, tmin, tmax, t), child = LSP_WIDE_NO_CHILD;
+      if (hits != 0) {
+        child = Tree<Text>::child_of(*node, static_cast<uint32_t>(std::countr_zero(hits)));
+        hits &= hits - 1;
+        *top = {{.children = hits}, static_cast<uint32_t>(node - tree_.nodes())};
+        top += hits != 0 ? 1 : 0;
+      } else if (!pop(top, node, child)) {
+        return true;
+      }
+      // What is below.
+      for (;;) {
+        if ((child & LSP_WIDE_NODE_BIT) != 0) {
+          if (const LspWideNode* below = tree_.below(*node, child)) {
+            node = below;
+            break;
+          }
+        } else {
+          if (left == 0) return false;
+          --left;
+          tree_.hit_leaf(*node, child, r.rows, best);
+          if (best.triangle != LSP_NONE) return true;
+        }
+        if (!pop(top, node, child)) return true;
+      }
+    }
+  }
+
+  // Takes a child of the node that waits on top of the stack. False: nothing waits.
+  HWY_INLINE bool pop(Waiting*& top, const LspWideNode*& node, uint32_t& child) const {
+    Waiting& waiting = top[-1];
+    if (waiting.node == kNoNode) return false;
+    node = tree_.nodes() + waiting.node;
+    child = Tree<Text>::child_of(*node, static_cast<uint32_t>(std::countr_zero(waiting.of.children)));
+    waiting.of.children &= waiting.of.children - 1;
+    top -= waiting.of.children == 0 ? 1 : 0;
+    return true;
+  }
+
+  const Tree<Text>& tree_;
   Waiting stack_[kStack];
 };
 
+// Invalid rays, those whose products may overflow, and those that a damaged file leads astray.
+LspHit trace_singly(const lsp_scene& scene, const LspRay& ray, uint32_t flags) {
+  LspHit hit;
+  trace_wide(scene, flags, 0, &ray, &hit, 1, nullptr);
+  return hit;
+}
+
+using FoundHits = Found<kGroup + kLanes>;
+
+void trace_closest(const Answered& to, uint32_t flags) {
+  const Tree<Text> tree(to.scene);
+  Batch batch(*to.scene.header);
+  Closest closest(tree);
+  FoundHits found;
+  for (uint32_t first = 0; first < to.count; first += kGroup) {
+    const auto here = static_cast<uint32_t>(std::min<size_t>(to.count - first, kGroup));
+    const uint32_t ready = batch.make_ready(to.rays + first, here);
+    for (uint32_t i = 0; i < here; ++i) {
+      const LspRay& ray = to.rays[first + i];
+      LspHit& hit = to.hits[first + i];
+      if ((ready >> i & 1u) == 0) {
+        hit = trace_singly(to.scene, ray, flags);
+        continue;
+      }
+      Best best = no_hit_before(batch.tmax[i]);
+      const bool complete = tree.empty() || closest.walk(Lone(batch, i, ray), best);
+      const uint32_t bits = complete ? 0 : LSP_HIT_INCOMPLETE;
+      if (best.triangle != LSP_NONE) {
+        found.add(to.scene, first + i, best.triangle, best.t, best.u, best.v, bits);
+      } else {
+        hit = Text::lsp_no_hit();
+        hit.flags = bits;
+      }
+    }
+    if (found.size() >= kLanes) found.answer(to);
+  }
+  found.answer(to);
+}
+
+// So few have little to share, and their order costs more than it saves.
+constexpr uint32_t kFewTogether = 256;
+
+// Rays that begin near each other go down the tree together.
+void trace_any(const Answered& to, uint32_t flags) {
+  const Tree<Text> tree(to.scene);
+  Batch batch(*to.scene.header);
+  AnyHit any_hit(tree);
+  FoundHits found;
+  uint16_t order[kMostOrdered];
+  const bool together = to.count >= kFewTogether;
+  if (together)
+    order_by_origin(to.rays, to.count, order);
+  else
+    for (uint32_t i = 0; i < to.count; ++i) order[i] = static_cast<uint16_t>(i);
+  for (uint32_t first = 0; first < to.count; first += kGroup) {
+    const auto here = static_cast<uint32_t>(std::min<size_t>(to.count - first, kGroup));
+    const uint16_t* numbers = order + first;
+    LspRay rays[kGroup];
+    for (uint32_t i = 0; i < here; ++i) rays[i] = to.rays[numbers[i]];
+    const uint32_t ready = batch.make_ready(rays, here);
+    const auto found_by = [&](uint32_t ray, const Best& best) HWY_ATTR {
+      found.add(to.scene, numbers[ray], best.triangle, best.t, best.u, best.v, 0);
+    };
+    uint32_t missed = ready;
+    bool complete = true;
+    for (uint32_t left = tree.empty() ? 0 : ready, rest; left != 0; left = rest) {
+      rest = together ? 0 : left & (left - 1);
+      uint32_t alive = left ^ rest;
+      complete &= any_hit.walk(batch, rays, alive, found_by);
+      missed &= rest | alive | ~left;
+    }
+    for (uint32_t i = 0; i < here; ++i) {
+      const bool is_ready = (ready >> i & 1u) != 0, misses = (missed >> i & 1u) != 0;
+      if (is_ready && !misses) continue;
+      to.hits[numbers[i]] =
+          is_ready && complete ? Text::lsp_no_hit() : trace_singly(to.scene, rays[i], flags);
+    }
+    if (found.size() >= kLanes) found.answer(to);
+  }
+  found.answer(to);
+}
+
 void trace(const lsp_scene& scene, uint32_t flags, const LspRay* rays, LspHit* hits, uint64_t count) {
-  Tracer tracer(scene);
-  static_assert(sizeof tracer <= 20 * 1024);  // of the stack, as lsp/lsp.h says
-  constexpr uint64_t kAtOnce = 1u << 30;      // numbers of rays have 32 bits
-  for (uint64_t first = 0; first < count; first += kAtOnce) {
-    const uint64_t here = std::min(count - first, kAtOnce);
-    if ((flags & LSP_TRACE_ANY_HIT) != 0)
-      tracer.trace<true>(rays + first, hits + first, here, flags);
+  // Of the stack, as lsp/lsp.h says.
+  static_assert(sizeof(Batch) + sizeof(Closest) + sizeof(FoundHits) <= 20 * 1024);
+  static_assert(sizeof(Batch) + sizeof(AnyHit) + sizeof(FoundHits) + kMostOrdered * sizeof(uint16_t) <=
+                30 * 1024);
+  const bool any_hit = (flags & LSP_TRACE_ANY_HIT) != 0;
+  const uint64_t at_once = any_hit ? kMostOrdered : uint64_t{1} << 30;  // numbers of rays have 32 bits
+  for (uint64_t first = 0; first < count; first += at_once) {
+    const auto here = static_cast<uint32_t>(std::min(count - first, at_once));
+    const Answered to = {scene, rays + first, hits + first, here, (flags & LSP_TRACE_OCCLUSION) != 0, false};
+    if (any_hit)
+      trace_any(to, flags);
     else
-      tracer.trace<false>(rays + first, hits + first, here, flags);
+      trace_closest(to, flags);
   }
 }
 

@@ -13,6 +13,7 @@
 #include "hard_rays.h"
 #include "lsp/lsp.h"
 #include "meshes.h"
+#include "ray_order.h"
 #include "surface_rays.h"
 #include "trace_cells_wide.h"
 #include "trace_wide_lanes.h"
@@ -332,6 +333,60 @@ TEST_P(WideExactTest, SameBitsAsSingleRays) {
   }
 }
 
+// Alone, in groups, and in the order of their origins; the last ones fill neither a vector nor a group.
+TEST_P(WideExactTest, SameBitsOfAnyNumberOfRays) {
+  const lsp::Baked baked = bake_cells(sphere(24), 0);
+  const lsp_scene scene = view(baked);
+  const std::vector<LspRay> rays = surface_rays(baked, 2500, 4);
+  const auto single = single_rays(scene, {LSP_TRACE_ANY_HIT, 0, 0, 0}, rays);
+  for (const size_t count : {1u, 3u, 8u, 31u, 33u, 255u, 256u, 300u, 4096u, 4097u, 9999u}) {
+    std::vector<LspHit> wide(count + 1);
+    wide.back().primitive = 12345;
+    wide_.trace(scene, LSP_TRACE_ANY_HIT, rays.data(), wide.data(), count);
+    EXPECT_EQ(wide.back().primitive, 12345u) << "written behind the end";
+    wide.pop_back();
+    expect_same({single.begin(), single.begin() + static_cast<std::ptrdiff_t>(count)}, wide,
+                {rays.begin(), rays.begin() + static_cast<std::ptrdiff_t>(count)},
+                std::to_string(count) + " rays");
+  }
+}
+
+TEST(RayOrder, NamesEveryRayOnceThoseNearEachOtherTogether) {
+  Numbers numbers(3);
+  std::vector<LspRay> rays(kMostOrdered);
+  for (LspRay& ray : rays)
+    ray = {{numbers.between(-8, 8), numbers.between(0, 1), numbers.between(3, 5)}, 0, {1, 0, 0}, 1};
+  std::vector<uint16_t> order(rays.size());
+  order_by_origin(rays.data(), kMostOrdered, order.data());
+  std::vector<bool> named(rays.size());
+  for (const uint16_t i : order) {
+    ASSERT_LT(i, rays.size());
+    EXPECT_FALSE(named[i]) << i << " is named twice";
+    named[i] = true;
+  }
+  const auto way = [&](const auto& number_of) {
+    double sum = 0;
+    for (size_t i = 1; i < rays.size(); ++i) {
+      const lsp_float3 a = rays[number_of(i - 1)].origin, b = rays[number_of(i)].origin;
+      sum += std::hypot((a.x - b.x) / 16, a.y - b.y, (a.z - b.z) / 2);
+    }
+    return sum;
+  };
+  EXPECT_LT(way([&](size_t i) { return order[i]; }), 0.25 * way([](size_t i) { return i; }));
+}
+
+TEST(RayOrder, TakesOriginsThatAreNoPlaces) {
+  std::vector<LspRay> rays(100, LspRay{{1, 2, 3}, 0, {1, 0, 0}, 1});
+  rays[0].origin.x = rays[7].origin.y = std::numeric_limits<float>::quiet_NaN();
+  rays[20].origin.z = kInfinity;
+  rays[30].origin.x = -kInfinity;
+  rays[31].origin.x = 3e38f;
+  std::vector<uint16_t> order(rays.size());
+  order_by_origin(rays.data(), 100, order.data());
+  std::sort(order.begin(), order.end());
+  for (size_t i = 0; i < order.size(); ++i) EXPECT_EQ(order[i], i);
+}
+
 // Where products of positions and reciprocals overflow the text of single rays answers.
 TEST_P(WideExactTest, SameBitsInHugeScenes) {
   for (const float scale : {1e13f, 1e17f}) {
@@ -358,11 +413,12 @@ TEST_P(WideExactTest, EndsOnDamagedFiles) {
     auto* bytes = reinterpret_cast<uint8_t*>(baked.wide.nodes.data());
     const size_t size = baked.wide.nodes.size() * sizeof(LspWideNode);
     for (size_t k = 0; k < size / 64 + 1; ++k) bytes[random() % size] = static_cast<uint8_t>(random());
-    // One that names itself, over and over.
+    // One that names itself, over and over, and one whose children's numbers begin again at zero.
     baked.wide.nodes[0].node_first = 0;
+    baked.wide.nodes[1].node_first = ~0u;
     const lsp_scene scene = view(baked);
     std::vector<LspHit> hits(rays.size());
-    for (const bool any : {false, true}) {
+    for (const uint32_t any : {0u, LSP_TRACE_ANY_HIT}) {
       wide_.trace(scene, any, rays.data(), hits.data(), rays.size());
       for (const LspHit& hit : hits)
         ASSERT_TRUE(hit.primitive == LSP_NONE || hit.primitive < baked.header.primitive_count);

@@ -148,13 +148,15 @@ typedef struct lsp_trace_counts {
 /* Adds `more` to *sum, field by field: of threads, or of parts of a set of rays. */
 LSP_API void lsp_add_counts(lsp_trace_counts* sum, const lsp_trace_counts* more);
 
-/* Traces rays[0, count) into hits[0, count), in this thread, with some 20 KiB of its stack, 50 KiB where the
- * scene has cells. Adds to *counts unless it is NULL. Hand it many rays at once: approximate ones are traced
- * in groups of 16, so that while one waits for memory the others go on; of cells, where nothing is counted,
- * 128 in vector lanes, exact closest ones as well where a vector has 16, unless scene->cell_references is
- * NULL: then nothing of cells is read. LSP_ERROR_UNSUPPORTED when the file lacks what the options need: an
- * exact tree; and when this library does not know what they ask for: nothing is traced then. A file without
- * Line Spaces (a scene too small to need them) answers approximate traces exactly. */
+/* Traces rays[0, count) into hits[0, count), in this thread, with some 20 KiB of its stack, 40 KiB for
+ * any-hit rays, 50 KiB where the scene has cells. Adds to *counts unless it is NULL. Hand it many rays at
+ * once: approximate ones are traced in groups of 16, so that while one waits for memory the others go on; of
+ * cells, where nothing is counted, 128 in vector lanes, exact closest ones as well where a vector has 16,
+ * unless scene->cell_references is NULL: then nothing of cells is read. Exact any-hit rays of a file with
+ * cells or wide nodes go down the tree 32 together, those that begin near each other of every 4,096.
+ * LSP_ERROR_UNSUPPORTED when the file lacks what the options need: an exact tree; and when this library does
+ * not know what they ask for: nothing is traced then. A file without Line Spaces (a scene too small to need
+ * them) answers approximate traces exactly. */
 LSP_API lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options* options, const LspRay* rays,
                              LspHit* hits, uint64_t count, lsp_trace_counts* counts, lsp_error* error);
 
