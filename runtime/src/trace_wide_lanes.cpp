@@ -296,7 +296,7 @@ void trace_closest(const Answered& to, uint32_t flags) {
 }
 
 // So few have little to share, and their order costs more than it saves.
-constexpr uint32_t kFewTogether = 256;
+constexpr uint32_t kFewTogether = 48;
 
 // Rays that begin near each other go down the tree together.
 void trace_any(const Answered& to, uint32_t flags) {

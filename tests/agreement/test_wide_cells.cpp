@@ -339,7 +339,7 @@ TEST_P(WideExactTest, SameBitsOfAnyNumberOfRays) {
   const lsp_scene scene = view(baked);
   const std::vector<LspRay> rays = surface_rays(baked, 2500, 4);
   const auto single = single_rays(scene, {LSP_TRACE_ANY_HIT, 0, 0, 0}, rays);
-  for (const size_t count : {1u, 3u, 8u, 31u, 33u, 255u, 256u, 300u, 4096u, 4097u, 9999u}) {
+  for (const size_t count : {1u, 3u, 8u, 31u, 47u, 48u, 255u, 1023u, 1024u, 4096u, 4097u, 9999u}) {
     std::vector<LspHit> wide(count + 1);
     wide.back().primitive = 12345;
     wide_.trace(scene, LSP_TRACE_ANY_HIT, rays.data(), wide.data(), count);
