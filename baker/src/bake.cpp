@@ -170,6 +170,7 @@ Baked bake(const Mesh& mesh, const BakeOptions& asked, const Progress& progress)
     set_wide(baked.wide, baked.header);
   else
     set_bvh(job.bvh, baked.header);
+  if (base.has_wide_nodes) job.bvh = {};  // they stand for it
 
   lap();
   base.build(job);

@@ -377,9 +377,9 @@ class Filler {
       beyond_.back().tmin = 1.0f;
       beyond_.back().tmax = INFINITY;
     }
-    trace(scene_.whole, LSP_TRACE_ANY_HIT, beyond_, hits_);
+    trace(scene_.whole, LSP_TRACE_OCCLUSION, beyond_, hits_);
     for (size_t i = 0; i < leaving_.size(); ++i)
-      if (hits_[i].primitive != LSP_NONE) met_[leaving_[i]].sky = false;
+      if (hits_[i].t < INFINITY) met_[leaving_[i]].sky = false;
   }
 
   // A counting sort by entry.

@@ -13,7 +13,7 @@ namespace lsp {
 // What all cells share.
 struct CellScene {
   const CellGrid& grid;
-  const lsp_scene& whole;  // triangles' primitives are records
+  const lsp_scene& whole;
   std::span<const LspTriangle> triangles;
   std::span<const glm::vec3> colors;  // of materials, see Plane; empty: looks do not matter
   const CellTableOptions& options;

@@ -66,8 +66,6 @@ CellTables fill_cell_tables(const CellGrid& grid, const WideTree& tree, const Ls
                             std::span<const LspTriangle> triangles, std::span<const LspMaterial> materials,
                             const CellTableOptions& options, FilledCells& known, bool keep,
                             const std::function<void(double)>& progress) {
-  std::vector<LspTriangle> numbered(triangles.begin(), triangles.end());
-  for (size_t i = 0; i < numbered.size(); ++i) numbered[i].primitive = uint32_t(i);
   LspHeader whole_header = header;
   whole_header.required_features = LSP_FEATURE_EXACT | LSP_FEATURE_WIDE;
   set_wide(tree, whole_header);
@@ -75,11 +73,11 @@ CellTables fill_cell_tables(const CellGrid& grid, const WideTree& tree, const Ls
   lsp_scene whole{};
   whole.header = &whole_header;
   whole.wide_nodes = tree.nodes.data();
-  whole.triangles = numbered.data();
+  whole.triangles = triangles.data();
   const float diagonal = glm::length(vec(header.bounds_max) - vec(header.bounds_min));
   std::vector<glm::vec3> colors;
   for (const LspMaterial& m : materials) colors.push_back(vec(m.base_color) + vec(m.emission));
-  const CellScene scene{grid, whole, numbered, colors, options, kOffset * diagonal};
+  const CellScene scene{grid, whole, triangles, colors, options, kOffset * diagonal};
 
   CellTablesBuilder tables;
   std::atomic<size_t> done{0};
