@@ -11,6 +11,7 @@ namespace lsp {
 namespace {
 
 constexpr double kOffset = 1e-4;  // of the diagonal
+constexpr uint32_t kGlances = 4;  // of an eye that sees a back, for a front
 
 double diagonal(const LspHeader& h) { return glm::length(dvec(h.bounds_max) - dvec(h.bounds_min)); }
 
@@ -71,6 +72,20 @@ std::vector<LspRay> seen_rays(const Baked& baked, uint32_t points, uint32_t per_
   const lsp_scene scene = view(baked);
   std::vector<uint32_t> records(h.primitive_count);
   for (size_t i = 0; i < baked.triangles.size(); ++i) records[baked.triangles[i].primitive] = uint32_t(i);
+  const auto meet = [&](const LspRay& ray) {
+    LspHit hit;
+    const lsp_trace_options exact = {0, 0, 0, 0};
+    if (lsp_trace(&scene, &exact, &ray, &hit, 1, nullptr, nullptr) != LSP_OK) hit.primitive = LSP_NONE;
+    return hit;
+  };
+  const auto sees_front = [&](const lsp_float3& eye, uint64_t seed) {
+    for (uint32_t k = 0; k < kGlances; ++k) {
+      const glm::dvec3 d = random_on_sphere(seed, 80 + 16 * k);
+      const LspHit hit = meet({eye, 0, f3(d), INFINITY});
+      if (hit.primitive != LSP_NONE && glm::dot(make.normal_of(records[hit.primitive]), d) < 0) return true;
+    }
+    return false;
+  };
   std::vector<LspRay> rays;
   // A sixth of the eyes look from outside; of rays that see nothing there are others.
   for (uint64_t i = 1; rays.size() < size_t(points) * per_point && i < 16ull * points; ++i) {
@@ -82,15 +97,15 @@ std::vector<LspRay> seen_rays(const Baked& baked, uint32_t points, uint32_t per_
       look.origin = f3(eye);
       look.direction = f3(inside - eye);
     }
-    LspHit hit;
-    const lsp_trace_options exact = {0, 0, 0, 0};
-    if (lsp_trace(&scene, &exact, &look, &hit, 1, nullptr, nullptr) != LSP_OK || hit.primitive == LSP_NONE)
-      continue;
-    const glm::dvec3 n = make.normal_of(records[hit.primitive]);
+    const LspHit hit = meet(look);
+    if (hit.primitive == LSP_NONE) continue;
     const glm::dvec3 d = dvec(look.direction);
-    // From the back of a closed object nobody sees it.
-    if (glm::dot(n, d) > 0) continue;
-    const SurfacePoint point{dvec(look.origin) + d * double(hit.t), n};
+    SurfacePoint point{dvec(look.origin) + d * double(hit.t), make.normal_of(records[hit.primitive])};
+    if (glm::dot(point.normal, d) > 0) {
+      // From within a closed object nobody sees it, but rooms show backs, too.
+      if (!sees_front(look.origin, seed)) continue;
+      point.normal = -point.normal;
+    }
     for (uint32_t k = 0; k < per_point; ++k) rays.push_back(make.from(point, seed * per_point + k));
   }
   return rays;

@@ -66,21 +66,22 @@ class Views {
     return trace({away}).front().primitive == LSP_NONE;
   }
 
-  // Whether it is a view: mostly surfaces, from in front, and not right before the eye.
+  // Whether it is a view, see view_rays.
   bool look(const Eye& eye, uint64_t seed, std::vector<SurfacePoint>& seen) const {
     const std::vector<LspRay> rays = pixels(eye, seed);
     const std::vector<LspHit> hits = trace(rays);
-    size_t hit = 0, near = 0;
+    size_t hit = 0, near = 0, fronts = 0;
     for (size_t i = 0; i < rays.size(); ++i) {
       if (hits[i].primitive == LSP_NONE) continue;
       ++hit;
       near += double(hits[i].t) < kTooNear * diagonal_;
       const glm::dvec3 normal = points_.normal_of(records_[hits[i].primitive]);
       const glm::dvec3 direction = dvec(rays[i].direction);
-      if (glm::dot(normal, direction) <= 0)
-        seen.push_back({dvec(rays[i].origin) + direction * double(hits[i].t), normal});
+      const bool front = glm::dot(normal, direction) <= 0;
+      fronts += front;
+      seen.push_back({dvec(rays[i].origin) + direction * double(hits[i].t), front ? normal : -normal});
     }
-    return 2 * hit >= rays.size() && 4 * seen.size() >= 3 * hit && 20 * near <= hit;
+    return 2 * hit >= rays.size() && 4 * fronts >= hit && 20 * near <= hit;
   }
 
   std::vector<LspRay> pixels(const Eye& eye, uint64_t seed) const {

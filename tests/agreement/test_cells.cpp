@@ -256,6 +256,32 @@ TEST(Cells, ViewsLookAtFrontsFromWithin) {
   EXPECT_EQ(std::memcmp(again.rays.data(), seen.rays.data(), seen.rays.size() * sizeof(LspRay)), 0);
 }
 
+// Who stands in a room sees all of its walls, however they are wound.
+TEST(Cells, RoomsOfCarelessWindingAreSeenFromWithin) {
+  Mesh mesh = room();
+  for (size_t i = mesh.triangles.size() - 8; i < mesh.triangles.size(); ++i)  // the walls across y and z
+    std::swap(mesh.triangles[i].x, mesh.triangles[i].y);
+  const lsp::Baked turned = bake(mesh, options_of_cells());
+  const auto on_turned_walls_within = [](const std::vector<LspRay>& rays) {
+    return std::count_if(rays.begin(), rays.end(), [](const LspRay& r) {
+      const float y = std::fabs(r.origin.y), z = std::fabs(r.origin.z);
+      return std::fabs(r.origin.x) < 2.499f && std::max(y, z) > 2.49f && std::max(y, z) < 2.5f;
+    });
+  };
+  const std::vector<LspRay> seen = seen_rays(turned, 1024, 4), views = view_rays(turned, 12, 8, 4).rays;
+  EXPECT_GT(on_turned_walls_within(seen), ptrdiff_t(seen.size() / 4));
+  EXPECT_GT(on_turned_walls_within(views), ptrdiff_t(views.size() / 8));
+}
+
+// From the inside of a ball nobody looks.
+TEST(Cells, ClosedObjectsAreSeenFromWithout) {
+  const lsp::Baked ball = bake(sphere(24), options_of_cells());
+  for (const auto& rays : {seen_rays(ball, 1024, 4), view_rays(ball, 12, 8, 4).rays}) {
+    EXPECT_GT(rays.size(), 1000u);
+    EXPECT_EQ(leaving(trace(view(ball), {0, 0}, rays)), rays.size());
+  }
+}
+
 TEST(Cells, AnswersLieInTheInterval) {
   const lsp_scene scene = view(baked_room());
   std::vector<LspRay> rays = surface_rays(baked_room(), 4000, 1);

@@ -84,12 +84,20 @@ class Ways {
       const glm::vec3 share(float(random(i, 0)), float(random(i, 1)), float(random(i, 2)));
       looks.push_back({f3(lo + extent * share), 0, f3(random_on_sphere(i, 3)), INFINITY});
     }
-    const std::vector<LspHit> seen = traced(0, looks);
+    std::vector<LspRay> glances = looks;
+    for (size_t i = 0; i < looks.size(); ++i)
+      glances[i].direction = f3(random_on_sphere(kSeed + first + i, 40));
+    const std::vector<LspHit> seen = traced(0, looks), beside = traced(0, glances);
     for (size_t i = 0; i < seen.size(); ++i) {
       if (seen[i].primitive == LSP_NONE) continue;
-      const glm::vec3 d = vec(looks[i].direction), n = vec(seen[i].normal);
-      // From the back of a closed object nobody sees it.
-      if (glm::dot(n, d) > 0) continue;
+      const glm::vec3 d = vec(looks[i].direction);
+      glm::vec3 n = vec(seen[i].normal);
+      if (glm::dot(n, d) > 0) {
+        // From within a closed object nobody sees it, but rooms show backs, too.
+        if (beside[i].primitive == LSP_NONE || glm::dot(vec(beside[i].normal), vec(glances[i].direction)) > 0)
+          continue;
+        n = -n;
+      }
       const glm::vec3 origin = vec(looks[i].origin) + d * seen[i].t + n * offset_;
       for (uint32_t k = 0; k < kPerPoint; ++k) {
         const uint64_t number = (kSeed + first + i) * kPerPoint + k;
