@@ -110,6 +110,7 @@ TEST_F(BenchProgram, WritesAReport) {
   const Json& dial = json["sections"]["pareto"]["tables"]["pareto_dial"];
   expect_a_dial(dial, "diffuse, shuffled");
   expect_a_dial(dial, "surface");
+  expect_a_dial(dial, "ambient occlusion, shuffled");
   const Json& fields = json["sections"]["peers"]["tables"]["peers_field"];
   ASSERT_EQ(fields.size(), 4u) << "two sets of rays, a field and cells: " << run.output;
   for (const Json& row : fields) {
