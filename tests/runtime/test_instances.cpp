@@ -415,7 +415,7 @@ TEST_F(Refused, TransformsWithoutAnInverse) {
 
 TEST_F(Refused, MemoryTooSmallOrCrooked) {
   EXPECT_EQ(build({identity(), identity()}, 1), LSP_ERROR_LIMIT);
-  expect_refused(LSP_ERROR_LIMIT, "2 instances need 456 bytes");
+  expect_refused(LSP_ERROR_LIMIT, "2 instances need 712 bytes");
   EXPECT_EQ(build({identity()}, 0, 8), LSP_ERROR_LIMIT);
   EXPECT_EQ(lsp_instances_build(nullptr, 0, nullptr, LSP_MAX_INSTANCES + 1, nullptr, UINT64_MAX, &instances_,
                                 &error_),
