@@ -45,11 +45,11 @@ class InstanceBatch {
     hits_ = hits;
     begin(count);
     while (advance()) {
-      std::sort(waiting_, waiting_ + on_count_);
+      sort_by_asset();
       for (uint32_t first = 0, end = 0; first < on_count_; first = end) {
-        const uint32_t asset = asset_at(first);
-        while (end < on_count_ && asset_at(end) == asset) ++end;
-        if (const lsp_status status = trace_waiting(asset, &waiting_[first], end - first); status != LSP_OK)
+        const uint32_t asset = sorted_[first].asset;
+        while (end < on_count_ && sorted_[end].asset == asset) ++end;
+        if (const lsp_status status = trace_waiting(asset, &sorted_[first], end - first); status != LSP_OK)
           return status;
       }
     }
@@ -67,16 +67,22 @@ class InstanceBatch {
   const lsp_trace_counts& counts() const { return counts_; }
 
  private:
-  // A ray that waits, as a number to sort by: its asset's (the lowest 20 bits of it: others may come between
-  // those of one, which are then traced in several parts), its instance's, its own.
-  static constexpr uint32_t kRayBits = 20, kInstanceBits = 24;
-  static_assert(kBatch <= 1u << kRayBits && 1u << kInstanceBits > LSP_MAX_INSTANCES);
-  static uint32_t ray_of(uint64_t waiting) { return static_cast<uint32_t>(waiting) & ((1u << kRayBits) - 1); }
-  static uint32_t instance_of(uint64_t waiting) {
-    return static_cast<uint32_t>(waiting >> kRayBits) & LSP_MAX_INSTANCES;
-  }
+  // A ray that waits for its next instance.
+  struct Waiting {
+    uint32_t asset, instance, ray;
+  };
   uint32_t asset_of(uint32_t instance) const { return instances_.records[instance].instance.asset; }
-  uint32_t asset_at(uint32_t k) const { return asset_of(instance_of(waiting_[k])); }
+
+  // Those of an asset side by side, as they were. Of more assets than kPiles several share one: theirs may
+  // then come in several parts.
+  void sort_by_asset() {
+    constexpr uint32_t kPiles = 256;
+    uint16_t ends[kPiles + 1] = {};
+    for (uint32_t k = 0; k < on_count_; ++k) ++ends[waiting_[k].asset % kPiles + 1];
+    const uint32_t piles = std::min(instances_.asset_count, kPiles);
+    for (uint32_t i = 1; i < piles; ++i) ends[i + 1] += ends[i];
+    for (uint32_t k = 0; k < on_count_; ++k) sorted_[ends[waiting_[k].asset % kPiles]++] = waiting_[k];
+  }
 
   // Of occlusion there may be no more than t.
   static bool is_hit(const LspHit& hit) { return hit.t < INFINITY; }
@@ -117,8 +123,7 @@ class InstanceBatch {
       const uint32_t i = on_[k];
       const uint32_t instance = walks_[i].is_wide && next_[k] != kNoRoom ? next_[k] : next_of_two(i);
       if (instance == LSP_NONE) continue;
-      waiting_[on_count_] =
-          uint64_t{asset_of(instance)} << (kInstanceBits + kRayBits) | uint64_t{instance} << kRayBits | i;
+      waiting_[on_count_] = {asset_of(instance), instance, i};
       on_[on_count_++] = i;
     }
     return on_count_ > 0;
@@ -140,9 +145,9 @@ class InstanceBatch {
   __attribute__((noinline)) void begin_again(uint32_t i) { begin_walk(walks_[i], rays_[i], false); }
 
   // Traces the rays that wait for instances of one asset.
-  lsp_status trace_waiting(uint32_t asset, const uint64_t* waiting, uint32_t count) {
+  lsp_status trace_waiting(uint32_t asset, const Waiting* waiting, uint32_t count) {
     for (uint32_t k = 0; k < count; ++k) {
-      const uint32_t i = ray_of(waiting[k]), number = instance_of(waiting[k]);
+      const uint32_t i = waiting[k].ray, number = waiting[k].instance;
       LspRay& moved = moved_[k];
       moved = InstanceWalk::lsp_move_ray(lsp_load_place(instances_, number), rays_[i]);
       if (!is_hit(hits_[i])) continue;
@@ -157,7 +162,7 @@ class InstanceBatch {
       return status;
     counts.rays = counts.invalid = counts.hits = 0;  // those of the scene are counted here
     lsp_add_counts(&counts_, &counts);
-    for (uint32_t k = 0; k < count; ++k) keep(hits_[ray_of(waiting[k])], found_[k], instance_of(waiting[k]));
+    for (uint32_t k = 0; k < count; ++k) keep(hits_[waiting[k].ray], found_[k], waiting[k].instance);
     return LSP_OK;
   }
 
@@ -181,8 +186,9 @@ class InstanceBatch {
   LspHit* hits_ = nullptr;
   uint32_t on_count_ = 0;
   InstanceWalk walks_[kBatch];
-  uint32_t on_[kBatch];       // rays that go on
-  uint64_t waiting_[kBatch];  // the same, at their next instances
+  uint32_t on_[kBatch];      // rays that go on
+  Waiting waiting_[kBatch];  // the same, at their next instances
+  Waiting sorted_[kBatch];
   float tmax_[kBatch];
   uint32_t next_[kBatch];
   LspRay moved_[kBatch];
