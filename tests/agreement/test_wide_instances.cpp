@@ -8,7 +8,9 @@
 #include <cstring>
 #include <vector>
 
+#include "bake.h"
 #include "lsp/instances.hpp"
+#include "meshes.h"
 #include "scene_builder.h"
 #include "trace_instances.h"
 
@@ -139,11 +141,11 @@ TEST(WideInstances, LeaveOutNothing) {
 }
 
 // Closest hits bit for bit, occlusion as a yes or no.
-void expect_answers_of_the_binary_tree(const lsp_instances& instances) {
+void expect_answers_of_the_binary_tree(const lsp_instances& instances, uint32_t kind = 0) {
   const std::vector<LspRay> rays = rays_at(instances, 2000, 0);
   std::vector<LspHit> binary(rays.size()), wide(rays.size()), occluded(rays.size());
   const auto trace = [&](uint32_t flags, uint32_t mask, std::vector<LspHit>& hits, lsp_trace_counts* counts) {
-    const lsp_trace_options options{flags, 0};
+    const lsp_trace_options options{kind | flags, 0};
     ASSERT_EQ(lsp_trace_instances(&instances, &options, mask, rays.data(), hits.data(), rays.size(), counts,
                                   nullptr),
               LSP_OK);
@@ -168,6 +170,16 @@ TEST(WideInstances, AnswerAsTheBinaryTree) {
     const Instances instances({&one.scene, &two.scene}, scatter(count, 4, 1, 0));
     expect_answers_of_the_binary_tree(instances.view());
   }
+}
+
+TEST(WideInstances, AnswerAsTheBinaryTreeByTables) {
+  BakeOptions options;
+  options.base = Base::kCells;
+  options.cells = 6;
+  const lsp::Baked ball = bake(sphere(12), options), leaves = bake(soup(150, 0.5f), options);
+  const lsp_scene one = view(ball), two = view(leaves);
+  const Instances instances({&one, &two}, scatter(200, 4, 1, 0));
+  expect_answers_of_the_binary_tree(instances.view(), LSP_TRACE_APPROXIMATE);
 }
 
 // More wait than a ray has room for, after some instances: it starts again by the binary tree.
