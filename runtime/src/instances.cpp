@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "error.h"
+#include "wide_instances.h"
 
 namespace lsp {
 namespace {
@@ -21,7 +22,7 @@ static_assert(sizeof(lsp_instance) == 60 && sizeof(lsp_instance_record) == 160 &
 
 constexpr double kRounding = 0x1p-24;  // of a float: u in NUMERICS.md
 
-// The caller's memory: records, nodes, and the numbers of the instances in the order of the tree.
+// The caller's memory: records, nodes, wide nodes, and the numbers of the instances in the order of the tree.
 constexpr uint64_t kBytesEach =
     sizeof(lsp_instance_record) + 2 * sizeof(lsp_instance_node) + sizeof(uint32_t);
 
@@ -158,8 +159,9 @@ class Builder {
     return double(records_[instance].lo[axis]) + records_[instance].hi[axis];
   }
 
-  // The node of the instances order_[first, first + count), `depth` nodes below and with the root.
-  void make(uint32_t index, uint32_t first, uint32_t count, uint32_t depth) {
+  // The node of the instances order_[first, first + count), `depth` nodes below and with the root. Inlined
+  // into itself it is three times as long.
+  __attribute__((noinline)) void make(uint32_t index, uint32_t first, uint32_t count, uint32_t depth) {
     lsp_instance_node& node = nodes_[index];
     if (count == 1) {
       const lsp_instance_record& record = records_[order_[first]];
@@ -250,7 +252,9 @@ class Builder {
 }  // namespace
 }  // namespace lsp
 
-extern "C" uint64_t lsp_instances_bytes(uint32_t count) { return count * lsp::kBytesEach; }
+extern "C" uint64_t lsp_instances_bytes(uint32_t count) {
+  return count * lsp::kBytesEach + lsp::most_wide_nodes(count) * sizeof(lsp_instance_wide_node);
+}
 
 extern "C" lsp_status lsp_instances_build(const lsp_scene* const* assets, uint32_t asset_count,
                                           const lsp_instance* instances, uint32_t count, void* memory,
@@ -277,7 +281,10 @@ extern "C" lsp_status lsp_instances_build(const lsp_scene* const* assets, uint32
         fault != nullptr)
       return lsp::fail(error, LSP_ERROR_INVALID, 0, "instance %u: its %s", i, fault);
   }
-  lsp::Builder(records, nodes, reinterpret_cast<uint32_t*>(nodes + 2 * uint64_t{count})).build(count);
-  *out = {assets, records, nodes, asset_count, count};
+  auto* const wide = reinterpret_cast<lsp_instance_wide_node*>(nodes + 2 * uint64_t{count});
+  auto* const order = reinterpret_cast<uint32_t*>(wide + lsp::most_wide_nodes(count));
+  lsp::Builder(records, nodes, order).build(count);
+  lsp::widen(nodes, wide);
+  *out = {assets, records, nodes, wide, asset_count, count};
   return lsp::succeed(error);
 }

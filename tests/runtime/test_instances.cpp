@@ -349,6 +349,25 @@ TEST(Instances, ThousandsAreFoundAgain) {
   expect_closest({&asset}, instances, rays, hits);
 }
 
+// The same asset by many numbers: which one an instance has makes no difference.
+TEST(Instances, OfHundredsOfAssets) {
+  const Asset asset;
+  Random random(37);
+  std::vector<lsp_instance> places;
+  for (uint32_t i = 0; i < 700; ++i) places.push_back(anywhere(random, 0, 6));
+  const Instances one({&asset.scene}, places);
+  for (uint32_t i = 0; i < places.size(); ++i) places[i].asset = i * 7 % 600;
+  const Instances many(std::vector<const lsp_scene*>(600, &asset.scene), places);
+  const std::vector<LspRay> rays = rays_about(one.view(), 1000, 41);
+  for (const uint32_t flags : {0u, LSP_TRACE_ANY_HIT}) {
+    std::vector<LspHit> expected(rays.size()), hits(rays.size());
+    one.trace({flags, 0}, 255, rays, expected);
+    many.trace({flags, 0}, 255, rays, hits);
+    for (size_t i = 0; i < rays.size(); ++i)
+      ASSERT_EQ(memcmp(&hits[i], &expected[i], sizeof(LspHit)), 0) << i << ", flags " << flags;
+  }
+}
+
 TEST(Instances, NoneAtAll) {
   const Instances none;
   const LspRay ray = {{0, 0, -9}, 0, {0, 0, 1}, 100};
@@ -415,7 +434,7 @@ TEST_F(Refused, TransformsWithoutAnInverse) {
 
 TEST_F(Refused, MemoryTooSmallOrCrooked) {
   EXPECT_EQ(build({identity(), identity()}, 1), LSP_ERROR_LIMIT);
-  expect_refused(LSP_ERROR_LIMIT, "2 instances need 456 bytes");
+  expect_refused(LSP_ERROR_LIMIT, "2 instances need 712 bytes");
   EXPECT_EQ(build({identity()}, 0, 8), LSP_ERROR_LIMIT);
   EXPECT_EQ(lsp_instances_build(nullptr, 0, nullptr, LSP_MAX_INSTANCES + 1, nullptr, UINT64_MAX, &instances_,
                                 &error_),

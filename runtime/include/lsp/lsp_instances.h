@@ -51,16 +51,27 @@ typedef struct lsp_instance_node {
   float growth;   /* the largest of the instances below */
 } lsp_instance_node;
 
+/* The same tree with up to eight children a node, whose boxes lie side by side for vectors of the CPU: the
+ * binary one with nodes left out. Lanes without a child come last: inside out, and LSP_NONE. */
+typedef struct lsp_instance_wide_node {
+  float lo[3][8];    /* by axis, of each child's box in scene space */
+  float hi[3][8];    /* its other corner */
+  float growth[8];   /* the largest of the instances below */
+  uint32_t child[8]; /* index of a wide node; with bit 31 set the number of an instance */
+} lsp_instance_wide_node;
+
 /* Instances ready for rays: a view of the caller's memory and assets, nothing owned. */
 typedef struct lsp_instances {
   const lsp_scene* const* assets;     /* as given */
   const lsp_instance_record* records; /* `count` of them, in the order given */
   const lsp_instance_node* nodes;     /* the root first; 2 count - 1 */
+  const lsp_instance_wide_node* wide; /* the root first; of two instances at least */
   uint32_t asset_count;               /* of assets */
   uint32_t count;                     /* of instances */
 } lsp_instances;
 
-/* Bytes that lsp_instances_build needs for `count` instances: 228 each. */
+/* Bytes that lsp_instances_build needs for `count` instances: 375 each at most, of which shaders read the
+ * first 224 count. */
 LSP_API uint64_t lsp_instances_bytes(uint32_t count);
 
 /* Makes `count` instances of the assets ready for rays, in memory[0, bytes), 16-byte aligned and at least
