@@ -31,7 +31,6 @@ void bake_one(Arguments& a, ProgressBar& bar) {
   if (!a.shard.empty()) {
     const std::vector<std::string> names = names_of(mesh.materials);
     make_color_materials(mesh);
-    if (!a.depfile.empty()) write_depfile(a, mesh.sources);
     write_shard(a, {mesh, names, source, import_seconds}, write_options(a),
                 [&](std::string_view stage, double share) { bar.show(stage, share); });
     return;
