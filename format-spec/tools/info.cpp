@@ -89,7 +89,7 @@ int main(int argc, char** argv) {
   app.add_option("--section", arguments.section,
                  "Only this section, as NODE; with --annotate: all its elements");
   add_size_option(app, "--memory-limit", arguments.memory_limit,
-                  "For the sections of a packed file, as in 512MB or 8GB");
+                  "Memory that the sections of a packed file may take, as 512MB (default 8GiB)");
   add_common_options(app, "lsp-info", common);
   arrange_help(app, "lsp-info room.lsp --annotate",
                {{"Options", {"FILE.lsp", "--annotate", "--section NAME", "--memory-limit"}}});
