@@ -8,6 +8,7 @@
 #include "file.h"
 #include "lsp/command_line.h"
 #include "lsp/json_result.h"
+#include "rules.h"
 #include "summary.h"
 #include "view.h"
 
@@ -73,6 +74,8 @@ void show(const Arguments& arguments, const CommonOptions& common) {
     json_result() = summary;
   } else if (!common.quiet)
     std::fputs(summary_text(summary, arguments.section).c_str(), stdout);
+  if (summary["verdict"] == to_string(Verdict::kLimit))
+    throw Failure(Exit::kLimit, arguments.file, "was not shown in full: raise --memory-limit");
 }
 
 }  // namespace

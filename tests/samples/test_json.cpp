@@ -160,6 +160,18 @@ TEST_F(JsonOfFailures, FiguresAndErrorAreOneObject) {
   EXPECT_EQ(test::shell("lsp-validate --rules no.lsp >out 2>err", folder_.path()), 1);
 }
 
+TEST_F(JsonOfFailures, AMemoryLimitIsNoDamage) {
+  ASSERT_EQ(test::shell("lsp-sample-scene a.glb --quiet --scene plane && lsp-bake a.glb -o a.lsp --quiet "
+                        "--base wide --compress zstd",
+                        folder_.path()),
+            0);
+  const Outcome failed = expect_failure("lsp-info", "a.lsp --memory-limit 1", 6, "raise --memory-limit");
+  EXPECT_TRUE(failed.json.contains("sections"));
+  EXPECT_EQ(test::shell("lsp-info a.lsp --memory-limit 1 >out 2>err", folder_.path()), 6);
+  EXPECT_EQ(test::read_bytes(folder_.path() / "out").find("damaged"), std::string::npos);
+  EXPECT_EQ(test::shell("lsp-info a.lsp >out 2>err", folder_.path()), 0);
+}
+
 // An error that cannot be printed leaves the exit code that it has.
 TEST_F(JsonOfFailures, StandardOutputIsFull) {
   if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
