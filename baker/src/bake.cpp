@@ -125,11 +125,13 @@ void plan_memory(const Mesh& mesh, BakeOptions& options) {
   const bool spill = e.scene + e.line_spaces + e.in_flight > limit && !options.folder.empty();
   if (spill) options.line_space.folder = options.folder;
   const uint64_t needed = e.scene + e.in_flight + (spill ? 0 : e.line_spaces);
+  const bool has_line_spaces =
+      options.line_spaces && (options.base == Base::kBvh || options.base == Base::kNTree);
   if (needed > limit)
     throw Failure(Exit::kLimit, "",
                   "the bake needs about " + with_commas(needed >> 20) + " MiB, over the limit of " +
-                      with_commas(limit >> 20) +
-                      " MiB: raise --memory-limit, or lower --depth or --resolution");
+                      with_commas(limit >> 20) + " MiB: raise --memory-limit, or " +
+                      (has_line_spaces ? "lower --depth or --resolution" : "split the mesh"));
 }
 
 }  // namespace

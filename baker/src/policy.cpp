@@ -8,6 +8,7 @@
 
 #include "accuracy.h"
 #include "box.h"
+#include "import/import.h"
 #include "lsp/file_ending.h"
 #include "lsp/program.h"
 
@@ -50,6 +51,9 @@ void check(const Arguments& a) {
   if (scene && !a.instances)
     throw Failure(Exit::kUsage, a.output.string(),
                   "is the name of a scene: add --instances to write one, or give -o NAME.lsp");
+  if (is_mesh_name(a.output))
+    throw Failure(Exit::kUsage, a.output.string(),
+                  "is the name of a mesh, which would be lost: give -o NAME.lsp");
   if (a.exact && a.no_exact) throw Failure(Exit::kUsage, "", "--exact and --no-exact exclude each other");
   if (a.max_error > 0 && (a.resolution_given || a.depth_given || a.samples_given))
     throw Failure(Exit::kUsage, "",
@@ -84,6 +88,11 @@ void check(const Arguments& a) {
   if (!a.shard.empty() && a.max_size)
     throw Failure(Exit::kUsage, "",
                   "--max-size needs the whole bake, which no --shard has: choose the grid by --cells");
+  if (a.no_line_spaces && (a.depth_given || a.samples_given || a.triangles || a.normal_angle != 180 ||
+                           a.plane_tolerance != 0 || (a.resolution_given && !ntree)))
+    throw Failure(Exit::kUsage, "",
+                  "--no-line-spaces has no use for what is of Line Spaces: leave out --resolution, --depth, "
+                  "--samples, --triangles, --normal-angle and --plane-tolerance, or it");
   if (a.no_line_spaces && a.no_exact)
     throw Failure(Exit::kUsage, "", "--no-line-spaces with --no-exact leaves nothing to trace");
 }
@@ -288,17 +297,34 @@ Accuracy accuracy_of(const Arguments& a) {
   return accuracy;
 }
 
+namespace {
+
+// What `bake` returns. A bake does not know what it is of: its errors get the name of the first input.
+template <typename Bake>
+auto with_name(const Arguments& a, Bake&& bake) {
+  try {
+    return bake();
+  } catch (const Failure& failure) {
+    throw Failure(failure.exit(), failure.file().empty() ? a.inputs[0].string() : failure.file(),
+                  failure.what());
+  }
+}
+
+}  // namespace
+
 Baked bake_shard(const Mesh& mesh, const Arguments& a, const Shard& shard, const Progress& progress) {
   BakeOptions options = bake_options(a);
   options.cell_tables.shard = shard;
   options.finish = false;
   check_range(mesh, a);
-  return bake(mesh, options, progress);
+  return with_name(a, [&] { return bake(mesh, options, progress); });
 }
 
 Chosen bake_as_asked(const Mesh& mesh, Arguments& a, const Progress& progress, const FileSize& file_size) {
   check_range(mesh, a);
-  return a.max_size ? bake_within(mesh, a, progress, file_size) : bake_accurately(mesh, a, progress);
+  return with_name(a, [&] {
+    return a.max_size ? bake_within(mesh, a, progress, file_size) : bake_accurately(mesh, a, progress);
+  });
 }
 
 }  // namespace lsp

@@ -28,6 +28,9 @@ void write_depfile(const Arguments& a, const std::vector<std::vector<std::filesy
   const auto escaped = [](const std::filesystem::path& path) {
     std::string text;
     for (const char c : path.string()) {
+      if (c == '\n')
+        throw Failure(Exit::kUsage, printable(path.string()),
+                      "has a line break in its name, which no rule can: rename it, or leave out --depfile");
       if (c == ' ' || c == '#' || c == ':') text += '\\';
       if (c == '$') text += '$';
       text += c;

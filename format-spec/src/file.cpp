@@ -30,7 +30,7 @@ MappedFile::MappedFile(const std::filesystem::path& path) {
     fail(std::string("cannot be opened: ") + std::strerror(errno) + "; check the name and the permissions");
   struct stat status {};
   if (fstat(file.fd, &status) != 0) fail(std::string("cannot be examined: ") + std::strerror(errno));
-  if (!S_ISREG(status.st_mode)) fail("is not a regular file: give the name of an .lsp file");
+  if (!S_ISREG(status.st_mode)) fail("is not a regular file: give the name of one");
   size_ = static_cast<size_t>(status.st_size);
   if (size_ == 0) return;
   data_ = mmap(nullptr, size_, PROT_READ, MAP_PRIVATE, file.fd, 0);

@@ -374,6 +374,7 @@ Json summarize(std::span<const std::byte> file, const std::string& name, uint64_
     Json provenance = Json::parse(text, text + meta.data.size(), nullptr, false);
     if (!provenance.is_discarded()) json["provenance"] = std::move(provenance);
   }
+  json["verdict"] = to_string(report.verdict());
   json["findings"] = report.count(Severity::kError) + report.count(Severity::kFatal);
   return json;
 }
@@ -439,7 +440,10 @@ std::string summary_text(const Json& j, const std::string& section) {
                  d["nodes"].get<unsigned long long>(), d["leaves"].get<unsigned long long>(),
                  d["triangles"].get<unsigned long long>(), d["line_spaces"].get<unsigned long long>(),
                  100 * d["fill_rate"].get<double>());
-  if (j["findings"] != 0) text += "\nThis file is damaged: run lsp-validate.\n";
+  if (j["verdict"] == to_string(Verdict::kLimit))
+    text += "\nSections were not unpacked: raise --memory-limit.\n";
+  else if (j["findings"] != 0)
+    text += "\nThis file is damaged: run lsp-validate.\n";
   return text;
 }
 

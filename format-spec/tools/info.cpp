@@ -8,6 +8,7 @@
 #include "file.h"
 #include "lsp/command_line.h"
 #include "lsp/json_result.h"
+#include "rules.h"
 #include "summary.h"
 #include "view.h"
 
@@ -73,6 +74,8 @@ void show(const Arguments& arguments, const CommonOptions& common) {
     json_result() = summary;
   } else if (!common.quiet)
     std::fputs(summary_text(summary, arguments.section).c_str(), stdout);
+  if (summary["verdict"] == to_string(Verdict::kLimit))
+    throw Failure(Exit::kLimit, arguments.file, "was not shown in full: raise --memory-limit");
 }
 
 }  // namespace
@@ -89,7 +92,7 @@ int main(int argc, char** argv) {
   app.add_option("--section", arguments.section,
                  "Only this section, as NODE; with --annotate: all its elements");
   add_size_option(app, "--memory-limit", arguments.memory_limit,
-                  "For the sections of a packed file, as in 512MB or 8GB");
+                  "Memory that the sections of a packed file may take, as 512MB (default 8GiB)");
   add_common_options(app, "lsp-info", common);
   arrange_help(app, "lsp-info room.lsp --annotate",
                {{"Options", {"FILE.lsp", "--annotate", "--section NAME", "--memory-limit"}}});

@@ -21,6 +21,13 @@ fs::path folder_of(const fs::path& path) { return path.has_parent_path() ? path.
 // By which a file without a name can be linked.
 std::string name_of(int fd) { return "/proc/self/fd/" + std::to_string(fd); }
 
+// `target`'s name with `end`, cut where a file system allows no more.
+std::string beside(const fs::path& target, const std::string& end) {
+  constexpr size_t kLongestName = 255;
+  const std::string name = target.filename().string();
+  return (target.parent_path() / (name.substr(0, kLongestName - end.size()) + end)).string();
+}
+
 constexpr const char* kRemedy = "; give another place or make room";
 
 }  // namespace
@@ -36,7 +43,7 @@ OutputFile::OutputFile(const fs::path& path) : path_(path), target_(path) {
   if (direct_) {
     fd_ = open(path.c_str(), O_WRONLY | O_CLOEXEC);
   } else if (!open_without_a_name()) {
-    temporary_ = target_.string() + ".XXXXXX";
+    temporary_ = beside(target_, ".XXXXXX");
     fd_ = mkostemp(temporary_.data(), O_CLOEXEC);
     const mode_t mask = umask(0);
     umask(mask);
@@ -64,7 +71,7 @@ void OutputFile::give_a_name() {
   };
   for (uint32_t number = 0; temporary_.empty(); ++number) {
     const std::string name =
-        target_.string() + ".tmp" + std::to_string(getpid()) + "-" + std::to_string(number);
+        beside(target_, ".tmp" + std::to_string(getpid()) + "-" + std::to_string(number));
     if (link_to(name)) temporary_ = name;
     if (temporary_.empty() && errno != EEXIST) fail("cannot be written");
   }
@@ -124,8 +131,11 @@ void check_output(const fs::path& output, std::span<const fs::path> inputs) {
   if (!fs::is_directory(folder, error))
     throw Failure(Exit::kFile, output.string(),
                   "cannot be written: there is no folder " + folder.string() + ", make it or choose another");
-  if (fs::is_directory(output, error))
-    throw Failure(Exit::kFile, output.string(), "is a folder; give the name of a file in it");
+  const bool is_folder = fs::is_directory(output, error);
+  if (error == std::errc::filename_too_long)
+    throw Failure(Exit::kFile, output.string(),
+                  "cannot be written: the name is too long, give a shorter one");
+  if (is_folder) throw Failure(Exit::kFile, output.string(), "is a folder; give the name of a file in it");
   for (const fs::path& input : inputs)
     if (fs::equivalent(output, input, error))
       throw Failure(Exit::kUsage, output.string(), "is read, too, and would be lost; give another name");

@@ -125,6 +125,8 @@ Ending validate_all(const Arguments& arguments, const CommonOptions& common) {
 Ending validate(const Arguments& arguments, const CommonOptions& common) {
   if (arguments.rules) {
     if (common.json) throw Failure(Exit::kUsage, "", "--rules is Markdown; leave --json out");
+    if (!arguments.files.empty())
+      throw Failure(Exit::kUsage, arguments.files.front(), "--rules checks no file; leave out either");
     std::fputs(rules_markdown().c_str(), stdout);
     return {};
   }
@@ -138,8 +140,8 @@ Ending validate(const Arguments& arguments, const CommonOptions& common) {
 int main(int argc, char** argv) {
   CLI::App app(
       "Checks .lsp files and reports everything that is wrong with them.\n"
-      "Silent on success. Exit codes: 0 valid, 1 usage, 2 cannot be read, 3 invalid, 4 internal error,\n"
-      "5 needs a newer program, 6 over the memory limit, 7 not baked from the files of --mesh; of several\n"
+      "Silent on success. Exit codes: 0 valid, 1 usage, 2 cannot be read, 3 invalid, 4 internal error, "
+      "5 needs a newer program, 6 over the memory limit, 7 not baked from the files of --mesh; of several "
       "files the code of the first that is not valid.",
       "lsp-validate");
   Arguments arguments;
@@ -155,7 +157,7 @@ int main(int argc, char** argv) {
   app.add_option("--mesh", arguments.meshes,
                  "The source files, in the order of the bake: is the bake stale?");
   add_size_option(app, "--memory-limit", arguments.memory_limit,
-                  "For the sections of a packed file, as in 512MB or 8GB");
+                  "Memory that the sections of a packed file may take, as 512MB (default 8GiB)");
   app.add_option("--examples", arguments.examples, "How many findings of a rule are printed")
       ->capture_default_str();
   app.add_flag("--rules", arguments.rules, "Print the rule catalogue as Markdown and end");

@@ -45,8 +45,9 @@ void define(CLI::App& app, Options& options) {
                  "Hits to write: 32 bytes each, t, primitive, u, v, normal as float32 (primitive uint32), "
                  "flags uint32, from bit 8 on the instance's number")
       ->required();
-  app.add_option("--backend", options.backend,
-                 "Where to trace; of a scene of instances vulkan needs assets with cells or wide nodes")
+  app.add_option(
+         "--backend", options.backend,
+         "Where to trace (default cpu); of a scene of instances vulkan needs assets with cells or wide nodes")
       ->check(CLI::IsMember({"cpu", "vulkan"}));
   app.add_option("--mode", options.mode,
                  "Down to triangles or by Line Spaces; without it by Line Spaces if there are any")
@@ -57,12 +58,13 @@ void define(CLI::App& app, Options& options) {
          "finite where there is (default closest)")
       ->check(CLI::IsMember({"closest", "any", "occlusion"}));
   add_trace_arguments(app, options.trace);
-  app.add_option("--repeat", options.repeats, "Times to trace all rays")->check(CLI::Range(1u, 1000000u));
+  app.add_option("--repeat", options.repeats, "Times to trace all rays (default 1)")
+      ->check(CLI::Range(1u, 1000000u));
   app.add_option("--threads", options.threads, "Threads of the CPU backend; all without it")
-      ->check(CLI::Range(1u, 65536u));
+      ->check(CLI::Range(1u, 1024u));
   app.add_option("--device", options.device,
                  "Part of the Vulkan device's name; without it a GPU if there is one");
-  app.add_option("--load", options.load_path, "How the scene gets to the Vulkan device")
+  app.add_option("--load", options.load_path, "How the scene gets to the Vulkan device (default automatic)")
       ->check(CLI::IsMember({"automatic", "import", "upload"}));
   arrange_help(app, "lsp-trace room.lsp --rays rays.bin --hits hits.bin --json",
                {{"What most people need",
@@ -225,6 +227,10 @@ void run(const Options& options) {
     const bool approximate = (request.options.flags & LSP_TRACE_APPROXIMATE) != 0;
     for (const std::string& note : unused_arguments(options.trace, approximate, scene.headers()))
       std::cerr << "lsp-trace: " << options.file << ": " << note << "\n";
+    if (!request.vulkan && !options.device.empty())
+      std::cerr << "lsp-trace: " << options.file << ": --device does nothing: rays are traced on the CPU\n";
+    if (!request.vulkan && request.load_path != LoadPath::kAutomatic)
+      std::cerr << "lsp-trace: " << options.file << ": --load does nothing: rays are traced on the CPU\n";
     if (approximate && !scene.any_has(LSP_FEATURE_LINE_SPACES | LSP_FEATURE_CELLS))
       std::cerr << "lsp-trace: " << options.file
                 << ": neither Line Spaces nor cells in the file: approximate rays are exact\n";

@@ -50,7 +50,9 @@ int main(int argc, char** argv) {
       ->required();
   app.add_option("-o,--output", output, "The page")->required();
   app.add_option("--title", title, "What was baked");
-  app.add_option("--validate-seconds", validate_seconds, "Time of lsp-validate");
+  app.add_option("--validate-seconds", validate_seconds, "Time of lsp-validate")->check(CLI::Range(0.0, 1e9));
+  arrange_help(app, "lsp-demo-report out/demo -o out/demo/report.html --title 'the atrium'",
+               {{"Options", {"FOLDER", "--output FILE", "--title", "--validate-seconds SECONDS"}}});
   return run_program(kProgram, app, argc, argv, [&] {
     try {
       Figures figures{title,

@@ -24,7 +24,8 @@ int main(int argc, char** argv) {
   app.add_option("-o,--output", output, "Write the absolute difference, amplified, to this .png or .pfm");
   app.add_option("--factor", factor, "Amplification of the difference picture (default 4)")
       ->check(CLI::Range(0.0f, 1e6f));
-  app.add_option("--max-rmse", max_rmse, "Exit with 7 if the linear RMSE is larger");
+  app.add_option("--max-rmse", max_rmse, "Exit with 7 if the linear RMSE is larger")
+      ->check(CLI::Range(0.0, 1e30));
   arrange_help(app, "lsp-compare exact.pfm approximate.pfm -o difference.png",
                {{"Options", {"REFERENCE.pfm", "TEST.pfm", "--output FILE", "--factor", "--max-rmse"}}});
   return run_program(kProgram, app, argc, argv, [&] {

@@ -84,6 +84,9 @@ std::string rgba_png(int width, int height, const std::vector<uint8_t>& rgba) {
 }
 
 Picture read_pfm(const std::filesystem::path& path) {
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error))
+    throw Failure(Exit::kFile, path.string(), "is a folder; give the name of a .pfm picture");
   std::ifstream file(path, std::ios::binary);
   if (!file) throw Failure(Exit::kFile, path.string(), "cannot be opened; check the path");
   std::string magic;
@@ -98,7 +101,6 @@ Picture read_pfm(const std::filesystem::path& path) {
     throw Failure(Exit::kInvalid, path.string(),
                   "is not a colour .pfm picture; write one with lsp-render -o NAME.pfm");
   }
-  std::error_code error;
   const uint64_t size = std::filesystem::file_size(path, error);
   const uint64_t bytes = static_cast<uint64_t>(width) * static_cast<uint64_t>(height) * sizeof(glm::vec3);
   if (error || size < bytes) throw Failure(Exit::kInvalid, path.string(), "ends early; write it again");

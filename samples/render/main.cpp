@@ -115,6 +115,10 @@ void print_notes(const Arguments& arguments, const char* program, const RenderSc
   if (!arguments.light_quality.empty() && !approximate) say("--light-quality does nothing: rays are exact");
   if (!arguments.light_quality.empty() && approximate && arguments.effect == "ao")
     say("--light-quality does nothing: ambient occlusion has no rays to lights");
+  if (arguments.options.denoise && !arguments.heat.empty())
+    say("--denoise does nothing: --heat shows rays as they are");
+  if (arguments.options.bounces > 1 && (arguments.effect == "ao" || arguments.effect == "direct"))
+    say("--bounces does nothing: --effect " + arguments.effect + " has no indirect light");
   if (arguments.verify_percent > 0 && !approximate) say("--verify does nothing: rays are exact");
   if (arguments.verify_percent > 0 && approximate && !arguments.heat.empty())
     say("--verify does nothing: --heat shows rays as they are");

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "lsp/command_line.h"
+#include "lsp/file_ending.h"
 #include "lsp/json_result.h"
 #include "lsp/output_file.h"
 #include "scene.h"
@@ -21,10 +22,15 @@ int main(int argc, char** argv) {
   app.add_option("OUT.glb", output, "The file to write")->required();
   app.add_option("--scene", name, "atrium, grove, spheres, plane, objects (512 in a room) or stadium")
       ->check(CLI::IsMember({"atrium", "grove", "spheres", "plane", "objects", "stadium"}));
-  app.add_option("--triangles", triangles, "About how many triangles (default: as fine as looks good)")
+  app.add_option("--triangles", triangles,
+                 "About how many triangles, 1,000 to 20 million (default: as fine as looks good)")
       ->check(CLI::Range(uint64_t{1000}, uint64_t{20'000'000}));
   app.add_flag("--no-masks", no_masks, "Leave out the masks of leaves: cards are then solid");
+  arrange_help(app, "lsp-sample-scene grove.glb --scene grove",
+               {{"Options", {"OUT.glb", "--scene", "--triangles", "--no-masks"}}});
   return run_program(kProgram, app, argc, argv, [&] {
+    if (const std::string ending = file_ending(output); !ending.empty() && ending != ".glb")
+      throw Failure(Exit::kUsage, output, "scenes are written as .glb; choose such a name");
     check_output(output);
     const auto start = std::chrono::steady_clock::now();
     Scene scene = make_scene(name, triangles == 0 ? Detail{} : detail_for(name, triangles));

@@ -159,7 +159,8 @@ TEST_F(LspBake, WhatNoCellCanHoldHasExactRaysAlone) {
   EXPECT_EQ(run("cone.obj -o b.lsp --base cells"), 6);
   EXPECT_NE(read("err").find("9,000 triangles, and it can hold 8,191: give --base wide"), std::string::npos)
       << read("err");
-  EXPECT_EQ(run("cone.obj -o b.part --shard 1/2"), 6);
+  EXPECT_EQ(run("cone.obj -o b.part --shard 1/2 --depfile b.d"), 6);
+  EXPECT_FALSE(fs::exists(folder_ / "b.d")) << "the rule of a part that is not there";
 }
 
 // Slivers through one another, and a detail for whose sake the grid would be fine everywhere.
@@ -473,6 +474,32 @@ TEST_F(LspBake, NinjaAndMakeReadTheDepfile) {
       EXPECT_TRUE(is_new(tool)) << changed;
     }
   }
+}
+
+TEST_F(LspBake, AMeshIsNotTheNameOfABake) {
+  fs::copy(folder_ / "grid.obj", folder_ / "other.obj");
+  EXPECT_EQ(run("-o other.obj grid.obj --base wide"), 1) << "as from -o *.obj";
+  EXPECT_NE(read("err").find("other.obj: is the name of a mesh"), std::string::npos) << read("err");
+  EXPECT_EQ(read("other.obj"), read("grid.obj"));
+}
+
+TEST_F(LspBake, ErrorsOfABakeNameItsInputAndARemedyThatIs) {
+  const std::pair<const char*, const char*> cases[] = {{"--cells 4", "or split the mesh"},
+                                                       {"--depth 4", "or lower --depth or --resolution"}};
+  for (const auto& [options, remedy] : cases) {
+    EXPECT_EQ(run("grid.obj -o a.lsp --memory-limit 10MiB " + std::string(options)), 6);
+    EXPECT_NE(read("err").find("lsp-bake: grid.obj: the bake needs"), std::string::npos) << read("err");
+    EXPECT_NE(read("err").find(remedy), std::string::npos) << read("err");
+  }
+  EXPECT_EQ(run(". -o a.lsp"), 2);
+  EXPECT_NE(read("err").find("is a folder"), std::string::npos) << read("err");
+  EXPECT_EQ(run("grid.obj -o a.lsp --no-line-spaces --samples 3"), 1);
+}
+
+TEST_F(LspBake, ADepfileHasNoNameOfTwoLines) {
+  EXPECT_EQ(run("grid.obj -o 'a\nb.lsp' --base wide --depfile a.d"), 1);
+  EXPECT_NE(read("err").find("has a line break in its name"), std::string::npos) << read("err");
+  EXPECT_EQ(files(), 3u) << "neither the rule nor the bake is there";  // grid.obj, out and err
 }
 
 TEST_F(LspBake, KeepsWhatTheErrorAllows) {

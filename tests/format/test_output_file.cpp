@@ -40,6 +40,17 @@ class OutputFiles : public testing::Test {
   TemporaryFolder folder_;
 };
 
+// The name that a file has until it is whole is no longer than its own.
+TEST_F(OutputFiles, TheLongestNameIsTaken) {
+  const fs::path longest = folder_.path() / (std::string(251, 'x') + ".lsp");
+  const fs::path longer = folder_.path() / (std::string(252, 'x') + ".lsp");
+  EXPECT_EQ(exit_of([&] { check_output(longest); }), Exit::kDone);
+  EXPECT_EQ(exit_of([&] { write_file(longest, "whole"); }), Exit::kDone);
+  EXPECT_EQ(read_bytes(longest), "whole");
+  EXPECT_EQ(count(), 1);
+  EXPECT_EQ(exit_of([&] { check_output(longer); }), Exit::kFile) << "before the work";
+}
+
 TEST_F(OutputFiles, AnOlderOneIsWholeUntilTheNewOneIs) {
   write_file(at("a"), "old");
   {

@@ -103,6 +103,41 @@ TEST_F(JsonOfFailures, JsonIsHeardWhereverItStands) {
   EXPECT_EQ(test::read_bytes(folder_.path() / "out"), "");
 }
 
+// An unset variable of a script is neither 0 nor an option left out.
+TEST_F(JsonOfFailures, EmptyWordsAreRefused) {
+  for (const Case& c : kCases) {
+    if (!std::filesystem::exists(std::filesystem::path(LSP_BIN_DIR) / c.program)) continue;
+    expect_failure(c.program, "''", 1, "a file's name is empty");
+  }
+  expect_failure("lsp-bake", "none.obj -o ''", 1, "-o has an empty value");
+  expect_failure("lsp-bake", "none.obj -o out.lsp --threads ''", 1, "--threads has an empty value");
+  expect_failure("lsp-bake", "none.obj -o out.lsp --shard=", 1, "--shard has an empty value");
+  expect_failure("lsp-compare", "none.pfm none.pfm --max-rmse ''", 1, "--max-rmse has an empty value");
+}
+
+// The words are not those of the parser's types and checks.
+TEST_F(JsonOfFailures, WhatIsWrongWithAValueIsSaidPlainly) {
+  const std::pair<const char*, const char*> cases[] = {
+      {"--cells 4.5", "--cells: 4.5 is no whole number from 0 to 1024; see lsp-bake --help"},
+      {"--max-error 101", "--max-error: 101 is no number from 0 to 100;"},
+      {"--threads -1", "--threads: -1 is no whole number from 0 to 1024;"},
+      {"--triangles x", "--triangles: x is no whole number;"},
+      {"--branching 17", "--branching: 17 is neither 0 nor a whole number from 2 to 16;"},
+      {"--align x", "--align: x is none of its values;"},
+      {"--max-size 0.5MB", "--max-size: 0.5 is no whole number, take a smaller unit;"},
+      {"--memory-limit 3XB", "--memory-limit: xb is no unit of a size, give bytes or as 20MB or 2GiB;"},
+      {"--max-size 99999999999GB", "--max-size: 99999999999 gb is too large;"},
+      {"--max-size 99999999999999999999", "--max-size: 99999999999999999999 is too large;"},
+      {"--cells 3 --cells 4", "--cells is given more than once;"},
+      {"--cells", "--cells needs a value;"},
+      {"--depth", "--depth needs a value;"}};
+  for (const auto& [words, message] : cases)
+    expect_failure("lsp-bake", std::string("none.obj -o out.lsp ") + words, 1, message);
+  expect_failure("lsp-compare", "none.pfm none.pfm --max-rmse -1", 1, "-1 is no number from 0 to");
+  expect_failure("lsp-compare", ". none.pfm", 2, "is a folder");
+  expect_failure("lsp-sample-scene", "scene.obj", 1, "written as .glb");
+}
+
 // What was found out is there, too, in the same object.
 TEST_F(JsonOfFailures, FiguresAndErrorAreOneObject) {
   Picture picture(2, 2);
@@ -122,6 +157,19 @@ TEST_F(JsonOfFailures, FiguresAndErrorAreOneObject) {
   const Outcome several = expect_failure("lsp-validate", "no.lsp none.lsp", 3, "2 of 2 files");
   EXPECT_EQ(several.json["files"].size(), 2u);
   expect_failure("lsp-validate", "--rules", 1, "Markdown");
+  EXPECT_EQ(test::shell("lsp-validate --rules no.lsp >out 2>err", folder_.path()), 1);
+}
+
+TEST_F(JsonOfFailures, AMemoryLimitIsNoDamage) {
+  ASSERT_EQ(test::shell("lsp-sample-scene a.glb --quiet --scene plane && lsp-bake a.glb -o a.lsp --quiet "
+                        "--base wide --compress zstd",
+                        folder_.path()),
+            0);
+  const Outcome failed = expect_failure("lsp-info", "a.lsp --memory-limit 1", 6, "raise --memory-limit");
+  EXPECT_TRUE(failed.json.contains("sections"));
+  EXPECT_EQ(test::shell("lsp-info a.lsp --memory-limit 1 >out 2>err", folder_.path()), 6);
+  EXPECT_EQ(test::read_bytes(folder_.path() / "out").find("damaged"), std::string::npos);
+  EXPECT_EQ(test::shell("lsp-info a.lsp >out 2>err", folder_.path()), 0);
 }
 
 // An error that cannot be printed leaves the exit code that it has.

@@ -17,7 +17,15 @@ bool is_gltf(const std::filesystem::path& path) {
   return ending == ".gltf" || ending == ".glb";
 }
 
+bool is_mesh_name(const std::filesystem::path& path) {
+  const std::string ending = file_ending(path);
+  return is_gltf(path) || ending == ".obj" || ending == ".ply" || ending == ".stl" || ending == ".off";
+}
+
 void read_mesh_file(const std::filesystem::path& path, MeshBuilder& builder, PoseRequest& pose) {
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error))
+    throw Failure(Exit::kFile, path.string(), "is a folder, give the mesh files in it");
   if (is_gltf(path)) return read_gltf(path, builder, pose);
   const std::string ending = file_ending(path);
   if (ending == ".obj") return read_obj(path, builder);

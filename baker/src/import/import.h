@@ -25,6 +25,9 @@ struct ImportOptions {
   std::string animation = {};
 };
 
+// Whether a file of this name is read as a mesh.
+bool is_mesh_name(const std::filesystem::path& path);
+
 // Reads the files in order into one mesh in world space (float32, the files' own units and axes).
 //
 // Numbering: a triangle's primitive is its place in import order, rejected ones counted: inputs in the order

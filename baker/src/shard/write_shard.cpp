@@ -62,6 +62,7 @@ void write_shard(const Arguments& a, const ShardInput& input, const WriteOptions
   Timer timer;
   if (progress) progress("write", 0);
   const Json meta = provenance(a, baked, input.mesh, input.material_names, input.source, {});
+  if (!a.depfile.empty()) write_depfile(a, input.mesh.sources);  // a bake that is stopped leaves none
   const uint64_t bytes = write_part(a.output, baked, shard, {meta, accuracy_of(a), !a.no_exact, write});
   const Done done = {shard, baked, bytes, timer()};
   if (a.common.json)

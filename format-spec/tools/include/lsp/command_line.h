@@ -4,10 +4,12 @@
 
 #include <unistd.h>
 
+#include <cerrno>
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <cstdlib>
 #include <iostream>
 #include <mutex>
 #include <new>
@@ -19,6 +21,7 @@
 #include "lsp/json_result.h"
 #include "lsp/layout.h"
 #include "lsp/program.h"
+#include "lsp/usage_error.h"
 
 namespace lsp {
 
@@ -46,13 +49,16 @@ inline void add_common_options(CLI::App& app, const char* program, CommonOptions
 // An option that is a number of bytes, as 512MB or 2GiB.
 inline CLI::Option* add_size_option(CLI::App& app, const std::string& name, uint64_t& bytes,
                                     const std::string& description, bool kb_is_1000 = false) {
-  // CLI11 alone takes -1 for the largest number there is.
-  const auto refuse_negative = [](std::string& text) {
-    return text.find('-') == std::string::npos ? std::string() : text + " is no size";
+  // CLI11 alone takes -1, and what is larger, for the largest number there is.
+  const auto refuse_none = [](std::string& text) {
+    if (text.find('-') != std::string::npos) return text + " is no size";
+    errno = 0;
+    (void)std::strtoull(text.c_str(), nullptr, 10);
+    return errno == ERANGE ? text + " is too large" : std::string();
   };
   return app.add_option(name, bytes, description)
       ->transform(CLI::AsSizeValue(kb_is_1000))
-      ->transform(CLI::Validator(refuse_negative, ""));  // the last that is added is the first that runs
+      ->transform(CLI::Validator(refuse_none, ""));  // the last that is added is the first that runs
 }
 
 // What was printed has come out, or is no success.
@@ -91,6 +97,7 @@ template <typename Body>
 Ending parse_and_run(const char* program, CLI::App& app, int argc, char** argv, Body& body,
                      bool& says_itself) {
   try {
+    refuse_empty_words(app, argc, argv);
     try {
       app.parse(argc, argv);
     } catch (const CLI::Success& e) {
@@ -106,7 +113,7 @@ Ending parse_and_run(const char* program, CLI::App& app, int argc, char** argv, 
       return body();
     }
   } catch (const CLI::ParseError& e) {
-    return {Exit::kUsage, "", std::string(e.what()) + "; see " + program + " --help"};
+    return {Exit::kUsage, "", in_plain_words(app, e) + "; see " + program + " --help"};
   } catch (const Failure& e) {
     return {e.exit(), e.file(), e.what()};
   } catch (const std::bad_alloc&) {
