@@ -56,8 +56,8 @@ class Boxes {
         const float* const first = goes_up_[i] ? node.lo[i] : node.hi[i];
         const float* const second = goes_up_[i] ? node.hi[i] : node.lo[i];
         const V8 wider = hn::Mul(margin, steepness_[i]);
-        in = larger(hn::MulSub(hn::Sub(hn::LoadU(d8, first + at), origin_[i]), slope_[i], wider), in);
-        out = smaller(hn::MulAdd(hn::Sub(hn::LoadU(d8, second + at), origin_[i]), slope_[i], wider), out);
+        in = max_of(in, hn::MulSub(hn::Sub(hn::LoadU(d8, first + at), origin_[i]), slope_[i], wider));
+        out = min_of(out, hn::MulAdd(hn::Sub(hn::LoadU(d8, second + at), origin_[i]), slope_[i], wider));
       }
       hn::Store(in, d8, entries + at);
       hits |= mask_bits(d8, hn::Le(in, out)) << at;

@@ -52,90 +52,97 @@ Best no_hit_before(float tmax) {
   return best;
 }
 
-// Closest rays, one after the other, children from the nearest on.
-class Closest {
- public:
-  explicit Closest(const Tree<Text>& tree) : tree_(tree) { stack_[0] = {{-HUGE_VALF}, kNoNode}; }
-
-  // From the root on. False: the file's bounds are wrong.
-  HWY_INLINE bool walk(const Lone& r, Best& best) {
-    const V8 tmin = hn::Set(d8, r.tmin);
-    uint32_t left = tree_.most_steps();
-    const LspWideNode* node = tree_.nodes();
-    Waiting* top = stack_ + 1;
-    for (;;) {
-      if (left == 0) return false;
-      --left;
-      HWY_ALIGN float t[kChildren];
-      tree_.ask_for_children(*node);
-      uint32_t hits = hit_children(*node, r, tmin, hn::Set(d8, best.t), t);
-      uint32_t child = LSP_WIDE_NO_CHILD;
-      if (hits != 0) {
-        const auto first = static_cast<uint32_t>(std::countr_zero(hits));
-        hits &= hits - 1;
-        if (top > stack_ + kStack - kChildren) return false;
-        child = Tree<Text>::child_of(*node, hits == 0 ? first : push_farther(*node, t, first, hits, top));
-      } else if (!pop(best.t, top, node, child)) {
-        return true;
-      }
-      // What is below.
-      for (;;) {
-        if ((child & LSP_WIDE_NODE_BIT) != 0) {
-          if (const LspWideNode* below = tree_.below(*node, child)) {
-            node = below;
-            break;
-          }
-        } else {
-          if (left == 0) return false;
-          --left;
-          tree_.hit_leaf(*node, child, r.rows, best);
-        }
-        if (!pop(best.t, top, node, child)) return true;
-      }
-    }
+// Of children `first` and those of `hits`, entered at t: the nearest is returned, the others wait, the
+// farthest lowest.
+HWY_INLINE uint32_t push_farther(const Tree<Text>& tree, const LspWideNode& node, const float* t,
+                                 uint32_t first, uint32_t hits, Waiting*& top) {
+  const auto number = static_cast<uint32_t>(&node - tree.nodes()) << 3;
+  const Waiting* const bottom = top;
+  uint32_t nearest = first;
+  for (; hits != 0; hits &= hits - 1) {
+    const auto child = static_cast<uint32_t>(std::countr_zero(hits));
+    const bool is_nearer = t[child] < t[nearest];
+    const uint32_t other = is_nearer ? nearest : child;
+    nearest = is_nearer ? child : nearest;
+    Waiting* place = top++;
+    for (; place > bottom && place[-1].of.t < t[other]; --place) *place = place[-1];
+    *place = {{.t = t[other]}, number | other};
+    tree.ask_for(node, Tree<Text>::child_of(node, other));
   }
+  return nearest;
+}
 
- private:
-  // Of children `first` and those of `hits`, entered at t: the nearest is returned, the others wait, the
-  // farthest lowest.
-  HWY_INLINE uint32_t push_farther(const LspWideNode& node, const float* t, uint32_t first, uint32_t hits,
-                                   Waiting*& top) {
-    const auto number = static_cast<uint32_t>(&node - tree_.nodes()) << 3;
-    const Waiting* const bottom = top;
-    uint32_t nearest = first;
-    do {
-      auto child = static_cast<uint32_t>(std::countr_zero(hits));
-      hits &= hits - 1;
-      const bool is_nearer = t[child] < t[nearest];
-      const uint32_t other = is_nearer ? nearest : child;
-      nearest = is_nearer ? child : nearest;
-      Waiting* place = top++;
-      for (; place > bottom && place[-1].of.t < t[other]; --place) *place = place[-1];
-      *place = {{.t = t[other]}, number | other};
-      tree_.ask_for(node, Tree<Text>::child_of(node, other));
-    } while (hits != 0);
-    return nearest;
-  }
-
-  // Takes what waits on top of the stack, unless it is behind best_t. False: nothing.
-  HWY_INLINE bool pop(float best_t, Waiting*& top, const LspWideNode*& node, uint32_t& child) const {
+// Takes what waits on top of the stack, of closest rays what is not behind best_t. False: nothing waits.
+template <bool kAny>
+HWY_INLINE bool pop(const Tree<Text>& tree, float best_t, Waiting*& top, const LspWideNode*& node,
+                    uint32_t& child) {
+  if constexpr (kAny) {
+    Waiting& waiting = top[-1];
+    if (waiting.node == kNoNode) return false;
+    node = tree.nodes() + waiting.node;
+    child = Tree<Text>::child_of(*node, static_cast<uint32_t>(std::countr_zero(waiting.of.children)));
+    waiting.of.children &= waiting.of.children - 1;
+    top -= waiting.of.children == 0 ? 1 : 0;
+  } else {
     --top;
     while (top->of.t > best_t) --top;
-    const uint32_t waiting = top->node;
-    if (waiting == kNoNode) return false;
-    node = tree_.nodes() + (waiting >> 3);
-    child = Tree<Text>::child_of(*node, waiting & 7);
-    return true;
+    if (top->node == kNoNode) return false;
+    node = tree.nodes() + (top->node >> 3);
+    child = Tree<Text>::child_of(*node, top->node & 7);
   }
+  return true;
+}
 
-  const Tree<Text>& tree_;
-  Waiting stack_[kStack];
-};
+// A ray alone from a node on. Closest rays take children from the nearest on, any-hit rays in the order of
+// the file, and end with what they hit first. What waits goes between `top` and `end`. False: the file's
+// bounds are wrong.
+template <bool kAny>
+HWY_NOINLINE bool walk_alone(const Tree<Text>& tree, const Lone& r, const LspWideNode* node, Waiting* top,
+                             const Waiting* end, uint32_t& left, Best& best) {
+  constexpr size_t kPushed = kAny ? 1 : kChildren;
+  const V8 tmin = hn::Set(d8, r.tmin);
+  *top++ = {{.t = -HUGE_VALF}, kNoNode};
+  for (;;) {
+    if (left == 0 || top > end - kPushed) return false;
+    --left;
+    HWY_ALIGN float t[kChildren];
+    tree.ask_for_children(*node);
+    uint32_t hits = hit_children(*node, r, tmin, hn::Set(d8, best.t), t), child = LSP_WIDE_NO_CHILD;
+    if (hits != 0) {
+      auto first = static_cast<uint32_t>(std::countr_zero(hits));
+      hits &= hits - 1;
+      if constexpr (kAny) {
+        *top = {{.children = hits}, static_cast<uint32_t>(node - tree.nodes())};
+        top += hits != 0 ? 1 : 0;
+      } else {
+        first = push_farther(tree, *node, t, first, hits, top);
+      }
+      child = Tree<Text>::child_of(*node, first);
+    } else if (!pop<kAny>(tree, best.t, top, node, child)) {
+      return true;
+    }
+    // What is below.
+    for (;;) {
+      if ((child & LSP_WIDE_NODE_BIT) != 0) {
+        if (const LspWideNode* below = tree.below(*node, child)) {
+          node = below;
+          break;
+        }
+      } else {
+        if (left == 0) return false;
+        --left;
+        tree.hit_leaf(*node, child, r.rows, best);
+        if (kAny && best.triangle != LSP_NONE) return true;
+      }
+      if (!pop<kAny>(tree, best.t, top, node, child)) return true;
+    }
+  }
+}
 
 // Any-hit rays, a group together: a node is brought near and decoded once for all that visit it, and only a
 // ray that is left alone in a subtree goes on by itself. Every ray visits the nodes and leaves that it would
-// visit alone, in their order, which is the file's. (Tsakok, "Faster
-// Incoherent Rays: Multi-BVH Ray Stream Tracing", 2009.)
+// visit alone, in their order, which is the file's. (Tsakok, "Faster Incoherent Rays: Multi-BVH Ray Stream
+// Tracing", 2009.)
 class AnyHit {
  public:
   explicit AnyHit(const Tree<Text>& tree) : tree_(tree) { stack_[0].node = kNoNode; }
@@ -156,7 +163,8 @@ class AnyHit {
       if ((here & (here - 1)) == 0) {
         const auto i = static_cast<uint32_t>(std::countr_zero(here));
         Best best = no_hit_before(batch.tmax[i]);
-        if (!walk_alone(Lone(batch, i, rays[i]), node, top, left, best)) return false;
+        if (!walk_alone<true>(tree_, Lone(batch, i, rays[i]), node, top, stack_ + kStack, left, best))
+          return false;
         keep(i, best);
       } else {
         if (left == 0 || top > stack_ + kStack - kChildren) return false;
@@ -203,55 +211,6 @@ class AnyHit {
     }
   }
 
-  // A ray from a node on, until it hits something; what waits goes above `top`. False: the file's bounds are
-  // wrong.
-  HWY_NOINLINE bool walk_alone(const Lone& r, const LspWideNode* node, Waiting* top, uint32_t& left,
-                               Best& best) {
-    const V8 tmin = hn::Set(d8, r.tmin), tmax = hn::Set(d8, r.tmax);
-    *top++ = {{.children = 0}, kNoNode};
-    for (;;) {
-      if (left == 0 || top == stack_ + kStack) return false;
-      --left;
-      HWY_ALIGN float t[kChildren];
-      tree_.ask_for_children(*node);
-      uint32_t hits = hit_children(*node, r, tmin, tmax, t), child = LSP_WIDE_NO_CHILD;
-      if (hits != 0) {
-        child = Tree<Text>::child_of(*node, static_cast<uint32_t>(std::countr_zero(hits)));
-        hits &= hits - 1;
-        *top = {{.children = hits}, static_cast<uint32_t>(node - tree_.nodes())};
-        top += hits != 0 ? 1 : 0;
-      } else if (!pop(top, node, child)) {
-        return true;
-      }
-      // What is below.
-      for (;;) {
-        if ((child & LSP_WIDE_NODE_BIT) != 0) {
-          if (const LspWideNode* below = tree_.below(*node, child)) {
-            node = below;
-            break;
-          }
-        } else {
-          if (left == 0) return false;
-          --left;
-          tree_.hit_leaf(*node, child, r.rows, best);
-          if (best.triangle != LSP_NONE) return true;
-        }
-        if (!pop(top, node, child)) return true;
-      }
-    }
-  }
-
-  // Takes a child of the node that waits on top of the stack. False: nothing waits.
-  HWY_INLINE bool pop(Waiting*& top, const LspWideNode*& node, uint32_t& child) const {
-    Waiting& waiting = top[-1];
-    if (waiting.node == kNoNode) return false;
-    node = tree_.nodes() + waiting.node;
-    child = Tree<Text>::child_of(*node, static_cast<uint32_t>(std::countr_zero(waiting.of.children)));
-    waiting.of.children &= waiting.of.children - 1;
-    top -= waiting.of.children == 0 ? 1 : 0;
-    return true;
-  }
-
   const Tree<Text>& tree_;
   Waiting stack_[kStack];
 };
@@ -268,7 +227,7 @@ using FoundHits = Found<kGroup + kLanes>;
 void trace_closest(const Answered& to, uint32_t flags) {
   const Tree<Text> tree(to.scene);
   Batch batch(*to.scene.header);
-  Closest closest(tree);
+  Waiting stack[kStack];
   FoundHits found;
   for (uint32_t first = 0; first < to.count; first += kGroup) {
     const auto here = static_cast<uint32_t>(std::min<size_t>(to.count - first, kGroup));
@@ -281,7 +240,9 @@ void trace_closest(const Answered& to, uint32_t flags) {
         continue;
       }
       Best best = no_hit_before(batch.tmax[i]);
-      const bool complete = tree.empty() || closest.walk(Lone(batch, i, ray), best);
+      uint32_t left = tree.most_steps();
+      const bool complete = tree.empty() || walk_alone<false>(tree, Lone(batch, i, ray), tree.nodes(), stack,
+                                                              stack + kStack, left, best);
       const uint32_t bits = complete ? 0 : LSP_HIT_INCOMPLETE;
       if (best.triangle != LSP_NONE) {
         found.add(to.scene, first + i, best.triangle, best.t, best.u, best.v, bits);
@@ -340,7 +301,7 @@ void trace_any(const Answered& to, uint32_t flags) {
 
 void trace(const lsp_scene& scene, uint32_t flags, const LspRay* rays, LspHit* hits, uint64_t count) {
   // Of the stack, as lsp/lsp.h says.
-  static_assert(sizeof(Batch) + sizeof(Closest) + sizeof(FoundHits) <= 20 * 1024);
+  static_assert(sizeof(Batch) + kStack * sizeof(Waiting) + sizeof(FoundHits) <= 20 * 1024);
   static_assert(sizeof(Batch) + sizeof(AnyHit) + sizeof(FoundHits) + kMostOrdered * sizeof(uint16_t) <=
                 30 * 1024);
   const bool any_hit = (flags & LSP_TRACE_ANY_HIT) != 0;

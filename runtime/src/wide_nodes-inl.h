@@ -64,8 +64,8 @@ HWY_INLINE uint32_t hit_children(const LspWideNode& node, const Lone& r, V8 tmin
     const V8 last_x = hn::MulAdd(planes_at(bytes + r.last[0]), hn::Broadcast<0>(unit), hn::Broadcast<0>(far));
     const V8 last_y = hn::MulAdd(planes_at(bytes + r.last[1]), hn::Broadcast<1>(unit), hn::Broadcast<1>(far));
     const V8 last_z = hn::MulAdd(planes_at(bytes + r.last[2]), hn::Broadcast<2>(unit), hn::Broadcast<2>(far));
-    const V8 first = larger(first_z, larger(first_y, larger(first_x, tmin)));
-    const V8 last = smaller(last_z, smaller(last_y, smaller(last_x, tmax)));
+    const V8 first = max_of(max_of(max_of(tmin, first_x), first_y), first_z);
+    const V8 last = min_of(min_of(min_of(tmax, last_x), last_y), last_z);
     hn::Store(first, d8, entries + part * kBoxes);
     hits |= mask_bits(d8, hn::Le(first, last)) << (part * kBoxes);
   }
@@ -98,8 +98,8 @@ HWY_INLINE uint32_t hit_children(const LspWideNode& node, const Batch& rays, uin
       };
       V8 in = tmin, out = tmax;
       for (size_t axis = 0; axis < 3; ++axis) {
-        in = larger(meet(first[axis], rays.first_base[i], axis), in);
-        out = smaller(meet(last[axis], rays.last_base[i], axis), out);
+        in = max_of(in, meet(first[axis], rays.first_base[i], axis));
+        out = min_of(out, meet(last[axis], rays.last_base[i], axis));
       }
       hit[part] = hn::Or(hit[part], hn::IfThenElseZero(hn::RebindMask(du8, hn::Le(in, out)), bit));
     }

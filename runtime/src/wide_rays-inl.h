@@ -34,22 +34,6 @@ HWY_INLINE float farthest(const lsp_float3& v) {
   return std::max(std::max(std::fabs(v.x), std::fabs(v.y)), std::fabs(v.z));
 }
 
-// The larger; `than` where x is no number.
-HWY_INLINE V8 larger(V8 x, V8 than) {
-#if HWY_ARCH_X86
-  return hn::Max(x, than);
-#else
-  return hn::IfThenElse(hn::Lt(than, x), x, than);
-#endif
-}
-HWY_INLINE V8 smaller(V8 x, V8 than) {
-#if HWY_ARCH_X86
-  return hn::Min(x, than);
-#else
-  return hn::IfThenElse(hn::Lt(x, than), x, than);
-#endif
-}
-
 // Rays made ready, of which every one then has its rows: what boxes and triangles take of lsp_setup,
 // operation by operation. Where a coordinate is not tame, or a ray is invalid, it is not ready.
 class Batch {

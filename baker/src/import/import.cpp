@@ -17,21 +17,30 @@ bool is_gltf(const std::filesystem::path& path) {
   return ending == ".gltf" || ending == ".glb";
 }
 
-bool is_mesh_name(const std::filesystem::path& path) {
+namespace {
+
+using Reader = void (*)(const std::filesystem::path&, MeshBuilder&);
+
+// What reads files of this name, but glTF; null: none does.
+Reader reader_of(const std::filesystem::path& path) {
   const std::string ending = file_ending(path);
-  return is_gltf(path) || ending == ".obj" || ending == ".ply" || ending == ".stl" || ending == ".off";
+  return ending == ".obj"   ? read_obj
+         : ending == ".ply" ? read_ply
+         : ending == ".stl" ? read_stl
+         : ending == ".off" ? read_off
+                            : nullptr;
 }
+
+}  // namespace
+
+bool is_mesh_name(const std::filesystem::path& path) { return is_gltf(path) || reader_of(path) != nullptr; }
 
 void read_mesh_file(const std::filesystem::path& path, MeshBuilder& builder, PoseRequest& pose) {
   std::error_code error;
   if (std::filesystem::is_directory(path, error))
     throw Failure(Exit::kFile, path.string(), "is a folder, give the mesh files in it");
   if (is_gltf(path)) return read_gltf(path, builder, pose);
-  const std::string ending = file_ending(path);
-  if (ending == ".obj") return read_obj(path, builder);
-  if (ending == ".ply") return read_ply(path, builder);
-  if (ending == ".stl") return read_stl(path, builder);
-  if (ending == ".off") return read_off(path, builder);
+  if (const Reader read = reader_of(path)) return read(path, builder);
   throw Failure(Exit::kUnsupported, path.string(),
                 "is of no format known here, give .gltf, .glb, .obj, .ply, .stl or .off");
 }
