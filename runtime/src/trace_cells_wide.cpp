@@ -43,8 +43,8 @@ namespace {
 // How far from the grid exact rays may begin, in the sum of its sides.
 constexpr float kFarthestOrigin = 2;
 
-// A ray's doubt_: a miss of it is a mistake, and it was one (LspWalk.closed, .again).
-constexpr uint32_t kClosed = 1, kAgain = 2;
+// A ray's mode_: LspWalk.mode, and where a miss of it is a mistake (LspWalk.closed) this.
+constexpr uint32_t kModes = 3, kClosed = 4;
 
 // Exact traces that are kept under way when room is made for others.
 constexpr size_t kKept = 48;
@@ -156,15 +156,18 @@ struct Tracer : Rays<kPool> {
     store(first, tmin_ + i);
     store(last, tmax_ + i);
     store(number, ray_ + i);
-    store(hn::Zero(du), step_ + i);
-    store(hn::Zero(du), doubt_ + i);
+    store(hn::Zero(du), waiting_ + i);
     // Beyond, the margin of cells does not make up for what is rounded.
     const VF reach = set(kFarthestOrigin * static_cast<float>(grid.cells_x + grid.cells_y + grid.cells_z));
     begin(i, first, last, tables ? valid : hn::And(valid, hn::Lt(largest(load_3(origin_, i)), reach)));
   }
 
-  // lsp_begin.
-  HWY_INLINE void begin(size_t i, VF first, VF last, MF valid) {
+  // lsp_enter: where rays begin, or enter the grid.
+  struct Entered {
+    VF t, t_last;
+    VI axis, cell[3];
+  };
+  HWY_INLINE Entered enter(size_t i, VF first, VF last) const {
     const V3 o = load_3(origin_, i), inv = load_3(inverse_, i);
     const VF zero = hn::Zero(df);
     const V3 dims = {set(static_cast<float>(grid.cells_x)), set(static_cast<float>(grid.cells_y)),
@@ -177,16 +180,24 @@ struct Tracer : Rays<kPool> {
     const VF leaves = min_of(min_of(max_of(a.x, b.x), max_of(a.y, b.y)), max_of(a.z, b.z));
     const MF outside = hn::Gt(t_in, first);
     const VF begins = select(outside, t_in, first);
-    store(hn::IfThenElse(valid, min_of(leaves, last), set(-std::numeric_limits<float>::infinity())),
-          t_last_ + i);
-    store(begins, t_ + i);
     const VI side = hn::IfThenZeroElse(as_int(hn::Eq(t_in, enters.x)),
                                        select(as_int(hn::Eq(t_in, enters.y)), set_i(1), set_i(2)));
-    store(select(as_int(outside), side, set_i(LSP_NONE)), axis_ + i);
     const V3 p = point_at(o, load_3(direction_, i), begins);
-    store(cell_at(p.x, grid.cells_x), cell_[0] + i);
-    store(cell_at(p.y, grid.cells_y), cell_[1] + i);
-    store(cell_at(p.z, grid.cells_z), cell_[2] + i);
+    return {begins,
+            min_of(leaves, last),
+            select(as_int(outside), side, set_i(LSP_NONE)),
+            {cell_at(p.x, grid.cells_x), cell_at(p.y, grid.cells_y), cell_at(p.z, grid.cells_z)}};
+  }
+  HWY_INLINE void begin(size_t i, VF first, VF last, MF valid) {
+    const Entered at = enter(i, first, last);
+    store(hn::IfThenElse(valid, at.t_last, set(-std::numeric_limits<float>::infinity())), t_last_ + i);
+    store(at.t, t_ + i);
+    store(at.axis, axis_ + i);
+    for (size_t k = 0; k < 3; ++k) store(at.cell[k], cell_[k] + i);
+    store(hn::Zero(du), step_ + i);
+    const MU leaves = as_uint(hn::Lt(load(t_last_ + i), last));
+    const uint32_t mode = any_hit && (dial >> 8u) != 0 ? LSP_WALK_WAITS : LSP_WALK_CALLS;
+    store(select(leaves, set_u(mode), set_u(LSP_WALK_CALLS)), mode_ + i);
   }
 
   // lsp_cell_at, along an axis of `cells`.
@@ -194,18 +205,53 @@ struct Tracer : Rays<kPool> {
     return hn::ConvertTo(di, min_of(max_of(hn::Zero(df), p), set(static_cast<float>(cells) - 0.5f)));
   }
 
-  // Rays that missed where that is a mistake go on from where they began, see lsp_advance.
-  HWY_NOINLINE void doubt(size_t i, Bits doubted) {
-    const VF t = load(tmin_ + i);
-    const V3 p = point_at(load_3(origin_, i), load_3(direction_, i), t);
-    const MF these = mask_of(doubted);
-    const uint32_t cells[3] = {grid.cells_x, grid.cells_y, grid.cells_z};
-    const VF at[3] = {p.x, p.y, p.z};
+  // lsp_begins_again, of rays that are to.
+  HWY_NOINLINE void begin_again(size_t i, Bits lanes) {
+    const MF these = mask_of(lanes);
+    const Entered at = enter(i, load(tmin_ + i), load(tmax_ + i));
     for (size_t k = 0; k < 3; ++k)
-      store(select(as_int(these), cell_at(at[k], cells[k]), load(next_cell[k] + i)), next_cell[k] + i);
-    store(select(these, t, load(t_out + i)), t_out + i);
-    store(select(as_uint(these), set_u(kAgain), load(doubt_ + i)), doubt_ + i);
+      store(select(as_int(these), at.cell[k], load(next_cell[k] + i)), next_cell[k] + i);
+    store(select(these, at.t, load(t_out + i)), t_out + i);
+    store(select(as_int(these), hn::Max(at.axis, hn::Zero(di)), load(axis_out + i)), axis_out + i);
+    const VU mode = load(mode_ + i);
+    const MU waits = hn::Eq(hn::And(mode, set_u(kModes)), set_u(LSP_WALK_WAITS));
+    const MU some = hn::And(waits, hn::Ne(load(waiting_ + i), hn::Zero(du)));
+    const VU after =
+        select(some, hn::Or(hn::And(mode, set_u(kClosed)), set_u(LSP_WALK_MAKES_UP)), set_u(LSP_WALK_AGAIN));
+    store(select(as_uint(these), after, mode), mode_ + i);
     store(select(as_uint(these), set_u(LSP_NONE), load(step_ + i)), step_ + i);  // compact adds one
+  }
+
+  // Rays that began again for the cells that waited, all of which are made up for.
+  HWY_INLINE MF has_made_up(size_t i) const {
+    const MU makes_up = hn::Eq(hn::And(load(mode_ + i), set_u(kModes)), set_u(LSP_WALK_MAKES_UP));
+    return as_float(hn::And(makes_up, hn::Eq(load(waiting_ + i), hn::Zero(du))));
+  }
+  // Rays that begin again if they come to their end.
+  HWY_INLINE MF may_begin_again(size_t i) const {
+    const VU mode = load(mode_ + i);
+    const MU waits = hn::And(hn::Eq(hn::And(mode, set_u(kModes)), set_u(LSP_WALK_WAITS)),
+                             hn::Ne(load(waiting_ + i), hn::Zero(du)));
+    return as_float(hn::Or(waits, hn::Ne(hn::And(mode, set_u(kClosed)), hn::Zero(du))));
+  }
+  // lsp_step_bit.
+  HWY_INLINE VU step_bit(size_t i) const {
+    return hn::Shl(set_u(1), hn::Min(load(step_ + i), set_u(LSP_LAST_WAITING)));
+  }
+  // Of rays at filled cells those that look into them: where they make up for what waited the others have
+  // answered, and that is traced exactly.
+  HWY_INLINE MF make_up(size_t i, MF going, MF is_filled, VU word) {
+    const MU makes_up = hn::And(hn::Eq(hn::And(load(mode_ + i), set_u(kModes)), set_u(LSP_WALK_MAKES_UP)),
+                                hn::Lt(load(step_ + i), set_u(LSP_LAST_WAITING)));
+    const MU known = hn::And(makes_up, as_uint(going));
+    if (bits_of(as_float(known)) == 0) return is_filled;
+    const VU bit = step_bit(i), waiting = load(waiting_ + i);
+    const MU called =
+        hn::And(hn::And(known, as_uint(is_filled)), hn::Ne(hn::And(waiting, bit), hn::Zero(du)));
+    store(select(known, hn::AndNot(bit, waiting), waiting), waiting_ + i);
+    store(hn::And(word, set_u(~LSP_CELL_FILLED)), index + i);
+    exact |= bits_of(as_float(called)) << i;
+    return hn::AndNot(as_float(known), is_filled);
   }
 
   // A vector of new rays at a time.
@@ -255,8 +301,10 @@ struct Tracer : Rays<kPool> {
     const VU way = hn::Add(hn::ShiftLeft<2>(hn::BitCast(du, face)), quarter);
     const MU ends_outside = as_uint(hn::Lt(load(t_last_ + i), load(tmax_ + i)));
     const VU closed =
-        hn::And(hn::Shr(record[3], hn::And(way, set_u(31))), set_u(dial == LSP_DIAL_TABLES ? 0 : kClosed));
-    store(hn::IfThenElseZero(ends_outside, closed), doubt_ + i);
+        hn::And(hn::Shr(record[3], hn::And(way, set_u(31))), set_u(dial == LSP_DIAL_TABLES ? 0 : 1));
+    const VU mode = load(mode_ + i);
+    store(hn::Or(mode, hn::IfThenElseZero(ends_outside, hn::ShiftLeft<2>(closed))), mode_ + i);
+    static_assert(kClosed == 1 << 2);
     const MU none = hn::Eq(hn::And(mask, bit), hn::Zero(du));
     return select(none, set_u(LSP_NONE), hn::Add(set_u(grid.origin_entry_first), at));
   }
@@ -300,18 +348,19 @@ struct Tracer : Rays<kPool> {
     const MU inside = hn::And(hn::And(hn::Lt(hn::BitCast(du, x), set_u(grid.cells_x)),
                                       hn::Lt(hn::BitCast(du, y), set_u(grid.cells_y))),
                               hn::Lt(hn::BitCast(du, z), set_u(grid.cells_z)));
-    const MF going = hn::And(hn::And(here, as_float(hn::And(in_time, inside))), hn::Lt(t, load(t_last_ + i)));
-    Bits doubted = 0;
+    MF going = hn::And(hn::And(here, as_float(hn::And(in_time, inside))), hn::Lt(t, load(t_last_ + i)));
+    if (any_hit) going = hn::AndNot(has_made_up(i), going);
+    Bits again = 0;
     if (const Bits ended = bits_of(hn::AndNot(going, here)); ended != 0) {
       const Bits complete = bits_of(as_float(in_time));
-      doubted = ended & complete & bits_of(as_float(hn::Eq(load(doubt_ + i), set_u(kClosed))));
-      LSP_FOR_BITS(k, ended & ~doubted) {
+      again = ended & complete & bits_of(may_begin_again(i));
+      LSP_FOR_BITS(k, ended & ~again) {
         const bool is_over = (complete >> k & 1) != 0;
         end(ray_[i + k], is_over ? 0 : LSP_HIT_INCOMPLETE);
         if (!tables && !(is_over && t_last_[i + k] > -HUGE_VALF)) [[unlikely]]
           settle(ray_[i + k]);
       }
-      over |= (ended & ~doubted) << i;
+      over |= (ended & ~again) << i;
     }
     const VI of_grid = hn::Add(hn::Mul(hn::Add(hn::Mul(z, set_i(grid.cells_y)), y), set_i(grid.cells_x)), x);
     const VU word = load_words(scene.cell_words, hn::BitCast(du, of_grid), as_uint(going));
@@ -344,8 +393,9 @@ struct Tracer : Rays<kPool> {
     next(z, point.z, hn::Not(hn::Or(out_x, out_y)), 2);
     store(t_to, t_out + i);
     store(axis_to, axis_out + i);
-    if (doubted != 0) doubt(i, doubted);
-    const MF looks = as_float(is_filled);
+    if (again != 0) begin_again(i, again);
+    MF looks = as_float(is_filled);
+    if (any_hit) looks = make_up(i, going, looks, word);
     const Bits look_bits = bits_of(looks);
     if (look_bits == 0) return;
     filled |= look_bits << i;
@@ -423,18 +473,16 @@ struct Tracer : Rays<kPool> {
     const MF begins = as_float(hn::Lt(load(axis_ + i), hn::Zero(di)));
     said =
         select(as_uint(mask_of(unknown >> i)), hn::Or(said, set_u(LSP_LOSS_UNKNOWN << LSP_LOSS_SHIFT)), said);
-    const VU limit = hn::IfThenZeroElse(hn::Eq(load(doubt_ + i), set_u(kAgain)),
+    const VU limit = hn::IfThenZeroElse(hn::Eq(load(mode_ + i), set_u(LSP_WALK_AGAIN)),
                                         select(as_uint(begins), set_u(dial & 0xFFu), set_u(dial >> 8u)));
     const MF exactly = hn::AndNot(as_float(hn::Lt(hn::ShiftRight<LSP_LOSS_SHIFT>(said), limit)), looks);
     const VU answer = hn::And(said, set_u(LSP_ANSWER_MASK));
     const MF answers = hn::AndNot(exactly, hn::And(looks, as_float(hn::Lt(answer, set_u(LSP_ANSWER_LIMIT)))));
-    const MU is_sky =
-        hn::And(hn::Eq(answer, set_u(LSP_ANSWER_SKY)), hn::Ne(load(doubt_ + i), set_u(kClosed)));
+    const MU is_sky = hn::And(hn::Eq(answer, set_u(LSP_ANSWER_SKY)), hn::Lt(load(mode_ + i), set_u(kClosed)));
     const Bits sky = bits_of(hn::AndNot(exactly, hn::And(looks, as_float(is_sky))));
     LSP_FOR_BITS(k, sky) end(ray_[i + k], 0);
     over |= sky << i;
-    const Bits exact_bits = bits_of(exactly);
-    exact |= exact_bits << i;
+    exact |= (any_hit ? wait(i, exactly) : bits_of(exactly)) << i;
     const Bits answer_bits = bits_of(answers);
     if (answer_bits == 0) return;
 
@@ -450,6 +498,15 @@ struct Tracer : Rays<kPool> {
     split |= (answer_bits & ~direct_bits) << i;
     LSP_FOR_BITS(k, direct_bits) fetch_plane(plane[i + k]);
     LSP_FOR_BITS(k, answer_bits & ~direct_bits) fetch(scene.splits, plane[i + k]);
+  }
+
+  // Of rays that are to be traced exactly those that do not wait until no table has a hit.
+  HWY_INLINE Bits wait(size_t i, MF exactly) {
+    const MU waits =
+        hn::And(as_uint(exactly), hn::Eq(hn::And(load(mode_ + i), set_u(kModes)), set_u(LSP_WALK_WAITS)));
+    const VU waiting = load(waiting_ + i);
+    store(select(waits, hn::Or(waiting, step_bit(i)), waiting), waiting_ + i);
+    return bits_of(hn::AndNot(as_float(waits), exactly));
   }
 
   HWY_INLINE void fetch_plane(uint32_t number) {
@@ -534,7 +591,10 @@ struct Tracer : Rays<kPool> {
       add_found(ray_[k], plane);
       return;
     }
-    in_part |= Bits{1} << k;
+    if ((mode_[k] & kModes) == LSP_WALK_WAITS)
+      waiting_[k] |= Text::lsp_step_bit(step_[k]);
+    else
+      in_part |= Bits{1} << k;
   }
 
   HWY_INLINE void add_found(uint32_t number, const Best& best) {

@@ -89,7 +89,7 @@ template <size_t kMost>
 struct Rays {
   template <typename T>
   using Of = T[kMost + kLanes];
-  Of<uint32_t> ray_, step_, doubt_;
+  Of<uint32_t> ray_, step_, mode_, waiting_;
   Of<float> origin_[3], direction_[3], inverse_[3], tmin_, tmax_, t_, t_last_;
   Of<int32_t> cell_[3], axis_;
 
@@ -110,7 +110,8 @@ struct Rays {
     move(from.axis_, axis_);
     move(from.ray_, ray_);
     move(from.step_, step_);
-    move(from.doubt_, doubt_);
+    move(from.mode_, mode_);
+    move(from.waiting_, waiting_);
   }
 };
 

@@ -41,26 +41,27 @@ void leave(uint index) {
   uint number = atomicAdd(queue[head], 1u);
   if (number % LSP_VULKAN_GROUP_SIZE == 0u) atomicAdd(queue[head + 1u], 1u);
   queue[list_of(constants.pass + 1u) + number] = index;
-  uint bits = uint(lsp_walk.axis) | (lsp_walk.closed ? 4u : 0u) | (lsp_walk.again ? 8u : 0u) | lsp_walk.step << 4u;
+  uint bits = uint(lsp_walk.axis) | (lsp_walk.closed ? 4u : 0u) | lsp_walk.mode << 3u | lsp_walk.step << 5u;
   uvec3 cell = uvec3(lsp_walk.cell) & 0xFFFFu; // one of them may be -1
   hit_words[2u * index] = uvec4(lsp_walk.ref, bits, cell.x | cell.y << 16u, cell.z);
-  hit_words[2u * index + 1u] = uvec4(floatBitsToUint(vec3(lsp_walk.t, lsp_walk.exact_t, lsp_walk.t_last)), 0u);
+  hit_words[2u * index + 1u] = uvec4(floatBitsToUint(vec3(lsp_walk.t, lsp_walk.exact_t, lsp_walk.t_last)), lsp_walk.waiting);
 }
 
 // Takes up a ray where it was left.
 void take_up(LspScene scene, LspSetup s, LspQuery q, uint index) {
   uvec4 a = hit_words[2u * index];
-  vec3 b = uintBitsToFloat(hit_words[2u * index + 1u].xyz);
+  uvec4 b = hit_words[2u * index + 1u];
   lsp_walk.best = lsp_no_best(s);
   lsp_walk.ref = a.x;
   lsp_walk.axis = int(a.y & 3u);
   lsp_walk.closed = (a.y & 4u) != 0u;
-  lsp_walk.again = (a.y & 8u) != 0u;
-  lsp_walk.step = a.y >> 4u;
+  lsp_walk.mode = (a.y >> 3u) & 3u;
+  lsp_walk.step = a.y >> 5u;
   lsp_walk.cell = ivec3(int(a.z << 16u) >> 16, int(a.z) >> 16, int(a.w << 16u) >> 16);
-  lsp_walk.t = b.x;
-  lsp_walk.exact_t = b.y;
-  lsp_walk.t_last = b.z;
+  lsp_walk.t = uintBitsToFloat(b.x);
+  lsp_walk.exact_t = uintBitsToFloat(b.y);
+  lsp_walk.t_last = uintBitsToFloat(b.z);
+  lsp_walk.waiting = b.w;
   /* Such a cell is passed alone, so that the ray has come from the one before. (By the signs of s.inverse: with what
    * lsp_cell_ray answers assigned here, glslang's search for what `precise` concerns has no end.) */
   lsp_walk.exact_cell = lsp_walk.cell;

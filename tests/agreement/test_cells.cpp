@@ -298,6 +298,34 @@ TEST(Cells, AnswersLieInTheInterval) {
     }
 }
 
+// Whether any hit is found is what closest rays say, but a table that is sure spares the cells before it
+// their exact traces.
+TEST(Cells, AnyHitAsksTheTablesFirst) {
+  const auto expect_as_closest = [](const lsp_scene& scene, const std::vector<LspRay>& rays, float max_loss,
+                                    double share) {
+    lsp_trace_counts closest{}, any{};
+    const auto nearest = trace(scene, tables_but(max_loss), rays, &closest);
+    const auto hits = trace(scene, tables_but(max_loss, LSP_TRACE_ANY_HIT), rays, &any);
+    EXPECT_EQ(wrong_share(hits, nearest), 0.0) << max_loss;
+    EXPECT_GT(closest.exact, rays.size() / 10) << "nothing to spare";
+    EXPECT_LT(double(any.exact), share * double(closest.exact)) << max_loss;
+  };
+  std::vector<LspRay> rays = surface_rays(baked_room(), 20000, 1);
+  for (const float loss : {20.0f, 5.0f, 1.0f}) expect_as_closest(view(baked_room()), rays, loss, 0.7);
+  // They are too short for that.
+  for (LspRay& r : rays) r.tmax = 0.3f;
+  expect_as_closest(view(baked_room()), rays, 0, 1.01);
+  BakeOptions options = options_of_cells();
+  options.cells = 64;
+  const lsp::Baked row = bake(row_of_soup(20), options);
+  rays.clear();
+  for (int i = 0; i < 4096; ++i) {
+    const float y = float(i % 64) / 64, z = float(i / 64) / 64;
+    rays.push_back({{-1, y, z}, 0, {1, 0.01f * (y - z), 0.02f * (z - 0.5f)}, INFINITY});
+  }
+  expect_as_closest(view(row), rays, 5, 1.0);
+}
+
 TEST(Cells, RaysFromOutsideAndFromEmptyCells) {
   const lsp_scene scene = view(baked_room());
   std::vector<LspRay> rays;

@@ -69,6 +69,8 @@ std::vector<Scene> scenes(bool cells) {
   for (uint32_t i = 0; i < leaves.triangles.size(); ++i) leaves.material_ids[i] = i % 3;
   made.push_back({"in part", of(leaves, 5)});
   EXPECT_NE(made.back().baked.header.required_features & LSP_FEATURE_COVERAGE, 0u);
+  // Through it rays pass more filled cells than LspWalk.waiting tells apart.
+  made.push_back({"a row", of(row_of_soup(20), 64)});
   return made;
 }
 

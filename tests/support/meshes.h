@@ -35,6 +35,13 @@ inline Mesh soup(uint32_t count, float size) {
 }
 
 // A sphere of radius 1 in 2 * rings^2 quads less the poles' halves; normals point outward.
+// Small triangles along x, so few that rays get far between them.
+inline Mesh row_of_soup(float length) {
+  Mesh mesh = soup(uint32_t(30 * length), 0.2f);
+  for (glm::vec3& p : mesh.positions) p.x *= length;
+  return mesh;
+}
+
 inline Mesh sphere(uint32_t rings) {
   Mesh mesh;
   const auto at = [&](uint32_t i, uint32_t j) {

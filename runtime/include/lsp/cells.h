@@ -6,8 +6,10 @@
  * the origin table of its sub-cell, in others the far table, which is the paper's Line Space (section 3.1). An entry
  * is empty, a plane, or a split: two answers, and a linear form over the ray's place in the shaft whose sign chooses.
  * An entry that loses more than asked for is not heeded: the ray is traced exactly through this cell, in the cell's
- * own small tree, and goes on from there. A ray that misses everything, but leaves the cell it begins in by a way on
- * which the bake found no sky (LspFilledCell.closed), begins again, and every cell is traced exactly.
+ * own small tree, and goes on from there. Where any hit will do such cells wait: what a table is sure of, however far,
+ * ends the ray without them, and only where none is the ray begins again for them. A ray that misses everything, but
+ * leaves the cell it begins in by a way on which the bake found no sky (LspFilledCell.closed), begins again, and every
+ * cell is traced exactly.
  *
  * runtime/src/trace_cells_wide.cpp and wide_calls-inl.h state this a second time for rays in vector lanes, operation by
  * operation: what changes here changes there.
@@ -26,6 +28,14 @@
  * may end loops early, and then only memory tells, see lsp/bvh.h. */
 uint lsp_stack_ref[LSP_CELL_STACK];
 
+/* What becomes of cells that are to be traced exactly. */
+#define LSP_WALK_CALLS 0u    /* they are, on the way */
+#define LSP_WALK_WAITS 1u    /* they wait, see LspWalk.waiting */
+#define LSP_WALK_MAKES_UP 2u /* those that waited are, from the beginning of the ray on; the others have answered */
+#define LSP_WALK_AGAIN 3u    /* every cell is one, from the beginning of the ray on */
+/* The cell of LspWalk.waiting that stands for all behind it, too. */
+#define LSP_LAST_WAITING 31u
+
 /* How far the ray has come: it enters `cell` at t, by a side across `axis`, -1 where it begins there. Between passes
  * runtime/vulkan/trace_passes.comp keeps this in memory: what is added here is added there. */
 struct LspWalk {
@@ -37,9 +47,10 @@ struct LspWalk {
   float t_last; /* where it leaves the grid, or ends */
   ivec3 exact_cell; /* of ref; it has come out of it at t */
   float exact_t;    /* where it entered that */
-  uint step;
-  bool closed; /* it begins where no ray leaves the scene: a miss is a mistake */
-  bool again;  /* it was one: every cell is traced exactly, from the beginning on */
+  uint step;    /* cells so far, from the beginning on */
+  uint waiting; /* by step, bits: cells that wait */
+  uint mode;    /* LSP_WALK_* */
+  bool closed;  /* it begins where no ray leaves the scene: a miss is a mistake */
   bool any_hit;
   LspCounts counts;
 };
@@ -238,6 +249,8 @@ LSP_FN LspCellPassage lsp_cell_pass(LspCellRay r, ivec3 cell, int jump, float t)
   return pass;
 }
 
+LSP_FN uint lsp_step_bit(uint step) { return 1u << (step < LSP_LAST_WAITING ? step : LSP_LAST_WAITING); }
+
 /* What a filled cell's entry says of a ray that passes it from t to t_out. Answers whether the ray is over: it has its
  * hit, or leaves the scene. Otherwise it goes on, or is to be traced exactly here first, if lsp_walk.ref says so. */
 LSP_STEP bool lsp_cell_answer(LspScene scene, LspSetup s, LspQuery q, LspCellRay r, uint index, uint entry,
@@ -245,7 +258,7 @@ LSP_STEP bool lsp_cell_answer(LspScene scene, LspSetup s, LspQuery q, LspCellRay
   lsp_walk.counts.shafts += 1u;
   uint answer = entry & LSP_ANSWER_MASK;
   bool exactly = (LSP_PARTS & LSP_PART_CELL_EXACT) != 0u &&
-                 (lsp_walk.again || (entry >> LSP_LOSS_SHIFT) >= (begins ? q.dial & 0xFFu : q.dial >> 8u));
+                 (lsp_walk.mode == LSP_WALK_AGAIN || (entry >> LSP_LOSS_SHIFT) >= (begins ? q.dial & 0xFFu : q.dial >> 8u));
   bool over = answer == LSP_ANSWER_SKY && !lsp_walk.closed;
   if (!exactly && answer < LSP_ANSWER_LIMIT) {
     LspFilledCell answers = lsp_load_cell_answers(scene, index);
@@ -273,7 +286,9 @@ LSP_STEP bool lsp_cell_answer(LspScene scene, LspSetup s, LspQuery q, LspCellRay
       }
     }
   }
-  if (exactly) {
+  if (exactly && lsp_walk.mode == LSP_WALK_WAITS) {
+    lsp_walk.waiting |= lsp_step_bit(lsp_walk.step - 1u);
+  } else if (exactly) {
     lsp_walk.ref = index | LSP_LEAF_BIT;
     lsp_walk.exact_cell = cell;
     lsp_walk.exact_t = t;
@@ -281,14 +296,10 @@ LSP_STEP bool lsp_cell_answer(LspScene scene, LspSetup s, LspQuery q, LspCellRay
   return over && !exactly;
 }
 
-/* To the first cell of the ray; where it begins in it, through it. Only here origin tables are asked: apart from the loop
- * over the others, which a device runs through with all its invocations. */
-LSP_STEP void lsp_begin(LspScene scene, LspSetup s, LspQuery q) {
-  LspCellGrid grid = lsp_load_header(scene).cells;
-  LspCellRay r = lsp_cell_ray(grid, s);
-  vec3 dims = lsp_cell_dims(grid);
+/* To where the ray begins, or enters the grid. */
+LSP_STEP void lsp_enter(LspCellGrid grid, LspSetup s, LspCellRay r) {
   precise vec3 a = (vec3(0.0f, 0.0f, 0.0f) - r.origin) * r.inverse;
-  precise vec3 b = (dims - r.origin) * r.inverse;
+  precise vec3 b = (lsp_cell_dims(grid) - r.origin) * r.inverse;
   vec3 first = vec3(lsp_min(a.x, b.x), lsp_min(a.y, b.y), lsp_min(a.z, b.z));
   vec3 last = vec3(lsp_max(a.x, b.x), lsp_max(a.y, b.y), lsp_max(a.z, b.z));
   float t_in = lsp_max(lsp_max(first.x, first.y), first.z);
@@ -296,20 +307,30 @@ LSP_STEP void lsp_begin(LspScene scene, LspSetup s, LspQuery q) {
   lsp_walk.t_last = lsp_min(lsp_min(lsp_min(last.x, last.y), last.z), s.tmax);
   lsp_walk.t = outside ? t_in : s.tmin;
   lsp_walk.axis = !outside ? -1 : (t_in == first.x ? 0 : (t_in == first.y ? 1 : 2));
-  vec3 p = lsp_cell_point(r, lsp_walk.t);
-  lsp_walk.cell = lsp_cell_at(grid, p);
+  lsp_walk.cell = lsp_cell_at(grid, lsp_cell_point(r, lsp_walk.t));
+  lsp_walk.step = 0u;
+}
+
+/* To the first cell of the ray; where it begins in it, through it. Only here origin tables are asked: apart from the loop
+ * over the others, which a device runs through with all its invocations. */
+LSP_STEP void lsp_begin(LspScene scene, LspSetup s, LspQuery q) {
+  LspCellGrid grid = lsp_load_header(scene).cells;
+  LspCellRay r = lsp_cell_ray(grid, s);
+  lsp_enter(grid, s, r);
   lsp_walk.ref = lsp_walk.t < lsp_walk.t_last ? 0u : LSP_NONE;
   lsp_walk.exact_cell = lsp_walk.cell;
   lsp_walk.exact_t = lsp_walk.t;
-  lsp_walk.step = 0u;
   lsp_walk.closed = false;
-  lsp_walk.again = false;
   lsp_walk.best = lsp_no_best(s);
   lsp_walk.any_hit = (q.flags & LSP_TRACE_ANY_HIT) != 0u;
+  /* A ray that ends within the grid is short, and not many cells are there to spare it one that waits. */
+  bool waits = lsp_walk.any_hit && lsp_walk.t_last < s.tmax && (q.dial >> 8u) != 0u;
+  lsp_walk.mode = waits ? LSP_WALK_WAITS : LSP_WALK_CALLS;
+  lsp_walk.waiting = 0u;
   lsp_walk.counts = lsp_no_counts();
   lsp_stack_ref[0] = lsp_walk.ref;
   ivec3 cell = lsp_walk.cell;
-  if (outside || lsp_walk.ref == LSP_NONE) return;
+  if (lsp_walk.axis >= 0 || lsp_walk.ref == LSP_NONE) return;
   lsp_walk.step = 1u;
   lsp_walk.counts.nodes = 1u;
   uint word = lsp_load_cell_word(scene, (uint(cell.z) * grid.cells_y + uint(cell.y)) * grid.cells_x + uint(cell.x));
@@ -319,6 +340,7 @@ LSP_STEP void lsp_begin(LspScene scene, LspSetup s, LspQuery q) {
     uint index = word & ~LSP_CELL_FILLED;
     vec3 corner = lsp_cell_corner(cell);
     uint face_out = 2u * uint(pass.axis_out) + lsp_ahead(r, pass.axis_out);
+    vec3 p = lsp_cell_point(r, lsp_walk.t);
     LspCellLook look = lsp_cell_origin(grid, lsp_load_cell_origins(scene, index), p - corner, pass.to - corner,
                                        pass.axis_out, face_out);
     /* A ray that ends within the grid may miss what is beyond. */
@@ -337,6 +359,18 @@ LSP_STEP void lsp_begin(LspScene scene, LspSetup s, LspQuery q) {
   lsp_walk.axis = pass.axis_out;
 }
 
+/* Whether a ray that has come to its end without a hit begins again: for the cells that wait, or where a miss is a
+ * mistake. */
+LSP_STEP bool lsp_begins_again(LspCellGrid grid, LspSetup s, LspCellRay r) {
+  bool waits = lsp_walk.mode == LSP_WALK_WAITS && lsp_walk.waiting != 0u;
+  if (!waits && !lsp_walk.closed) return false;
+  lsp_walk.mode = waits ? LSP_WALK_MAKES_UP : LSP_WALK_AGAIN;
+  lsp_walk.closed = waits && lsp_walk.closed;
+  lsp_enter(grid, s, r);
+  if (lsp_walk.axis < 0) lsp_walk.axis = 0; /* it begins in no table: whatever is looked up there is not heeded */
+  return true;
+}
+
 /* From cell to cell until a table answers, or a cell is to be traced exactly, or the ray is over. */
 LSP_STEP void lsp_advance(LspScene scene, LspSetup s, LspQuery q) {
   LspCellGrid grid = lsp_load_header(scene).cells;
@@ -344,24 +378,27 @@ LSP_STEP void lsp_advance(LspScene scene, LspSetup s, LspQuery q) {
   uint most = grid.cells_x + grid.cells_y + grid.cells_z;
   bool over = lsp_walk.best.triangle != LSP_NONE;
   while (!over && lsp_walk.ref == 0u && lsp_walk.step < most) {
-    ivec3 cell = lsp_walk.cell;
-    float t = lsp_walk.t;
-    over = !(t < lsp_walk.t_last) || uint(cell.x) >= grid.cells_x || uint(cell.y) >= grid.cells_y || uint(cell.z) >= grid.cells_z;
-    if (over && lsp_walk.closed) {
-      over = false;
-      lsp_walk.closed = false;
-      lsp_walk.again = true;
-      lsp_walk.step = 0u;
-      t = s.tmin;
-      cell = lsp_cell_at(grid, lsp_cell_point(r, t));
-    }
+    over = !(lsp_walk.t < lsp_walk.t_last) || uint(lsp_walk.cell.x) >= grid.cells_x ||
+           uint(lsp_walk.cell.y) >= grid.cells_y || uint(lsp_walk.cell.z) >= grid.cells_z ||
+           (lsp_walk.mode == LSP_WALK_MAKES_UP && lsp_walk.waiting == 0u);
+    if (over) over = !lsp_begins_again(grid, s, r);
     if (over) break;
     lsp_walk.step += 1u;
     lsp_walk.counts.nodes += 1u;
+    ivec3 cell = lsp_walk.cell;
+    float t = lsp_walk.t;
     uint word = lsp_load_cell_word(scene, (uint(cell.z) * grid.cells_y + uint(cell.y)) * grid.cells_x + uint(cell.x));
     bool filled = (word & LSP_CELL_FILLED) != 0u;
     LspCellPassage pass = lsp_cell_pass(r, cell, filled ? 0 : int(word & LSP_CELL_MAX_JUMP), t);
-    if (filled) {
+    if (lsp_walk.mode == LSP_WALK_MAKES_UP && lsp_walk.step <= LSP_LAST_WAITING) {
+      uint bit = lsp_step_bit(lsp_walk.step - 1u);
+      if (filled && (lsp_walk.waiting & bit) != 0u) {
+        lsp_walk.ref = (word & ~LSP_CELL_FILLED) | LSP_LEAF_BIT;
+        lsp_walk.exact_cell = cell;
+        lsp_walk.exact_t = t;
+      }
+      lsp_walk.waiting &= ~bit;
+    } else if (filled) {
       uint index = word & ~LSP_CELL_FILLED;
       vec3 corner = lsp_cell_corner(cell);
       LspCellLook look = lsp_cell_far(grid, index, lsp_cell_point(r, t) - corner, pass.to - corner, lsp_walk.axis,
