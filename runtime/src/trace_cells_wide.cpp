@@ -502,11 +502,16 @@ struct Tracer : Rays<kPool> {
 
   // Of rays that are to be traced exactly those that do not wait until no table has a hit.
   HWY_INLINE Bits wait(size_t i, MF exactly) {
-    const MU waits =
-        hn::And(as_uint(exactly), hn::Eq(hn::And(load(mode_ + i), set_u(kModes)), set_u(LSP_WALK_WAITS)));
+    const MF waits = hn::And(exactly, may_wait(i));
     const VU waiting = load(waiting_ + i);
-    store(select(waits, hn::Or(waiting, step_bit(i)), waiting), waiting_ + i);
-    return bits_of(hn::AndNot(as_float(waits), exactly));
+    store(select(as_uint(waits), hn::Or(waiting, step_bit(i)), waiting), waiting_ + i);
+    return bits_of(hn::AndNot(waits, exactly));
+  }
+  HWY_INLINE MF may_wait(size_t i) const {
+    const MU waits = hn::Eq(hn::And(load(mode_ + i), set_u(kModes)), set_u(LSP_WALK_WAITS));
+    const MU some =
+        hn::Or(hn::Ne(load(waiting_ + i), hn::Zero(du)), hn::Lt(load(step_ + i), set_u(LSP_LAST_WAITING)));
+    return as_float(hn::And(waits, some));
   }
 
   HWY_INLINE void fetch_plane(uint32_t number) {
@@ -591,7 +596,7 @@ struct Tracer : Rays<kPool> {
       add_found(ray_[k], plane);
       return;
     }
-    if ((mode_[k] & kModes) == LSP_WALK_WAITS)
+    if ((bits_of(may_wait(k)) & 1) != 0)
       waiting_[k] |= Text::lsp_step_bit(step_[k]);
     else
       in_part |= Bits{1} << k;

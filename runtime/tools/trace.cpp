@@ -31,7 +31,7 @@ struct Options {
   std::string device;
   TraceArguments trace;
   uint32_t repeats = 1;
-  uint32_t threads = machine_threads();
+  uint32_t threads = 0;  // all
   CommonOptions common;
 };
 
@@ -60,8 +60,7 @@ void define(CLI::App& app, Options& options) {
   add_trace_arguments(app, options.trace);
   app.add_option("--repeat", options.repeats, "Times to trace all rays (default 1)")
       ->check(CLI::Range(1u, 1000000u));
-  app.add_option("--threads", options.threads, "Threads of the CPU backend; all without it")
-      ->check(CLI::Range(1u, 1024u));
+  add_threads(app, options.threads, "Threads of the CPU backend");
   app.add_option("--device", options.device,
                  "Part of the Vulkan device's name; without it a GPU if there is one");
   app.add_option("--load", options.load_path, "How the scene gets to the Vulkan device (default automatic)")
@@ -137,7 +136,7 @@ TraceRequest make_request(const Options& options, const Scene& scene) {
   if (options.query == "occlusion") request.options.flags |= LSP_TRACE_OCCLUSION;
   request.vulkan = options.backend == "vulkan";
   request.repeats = options.repeats;
-  request.threads = options.threads;
+  request.threads = options.threads != 0 ? options.threads : machine_threads();
   request.device = options.device;
   if (options.load_path == "import") request.load_path = LoadPath::kImport;
   if (options.load_path == "upload") request.load_path = LoadPath::kUpload;
@@ -159,7 +158,7 @@ nlohmann::ordered_json to_json(const Options& options, const TraceRequest& reque
   json["query"] = options.query;
   json["near"] = options.trace.near;
   json["lod"] = options.trace.lod;
-  json["threads"] = request.vulkan ? 0u : options.threads;
+  json["threads"] = request.vulkan ? 0u : request.threads;
   json["rays"] = counts.rays;
   json["invalid"] = counts.invalid;
   json["hits"] = counts.hits;

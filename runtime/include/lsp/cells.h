@@ -31,9 +31,9 @@ uint lsp_stack_ref[LSP_CELL_STACK];
 /* What becomes of cells that are to be traced exactly. */
 #define LSP_WALK_CALLS 0u    /* they are, on the way */
 #define LSP_WALK_WAITS 1u    /* they wait, see LspWalk.waiting */
-#define LSP_WALK_MAKES_UP 2u /* those that waited are, from the beginning of the ray on; the others have answered */
+#define LSP_WALK_MAKES_UP 2u /* those that waited are, from the first on; the others have answered */
 #define LSP_WALK_AGAIN 3u    /* every cell is one, from the beginning of the ray on */
-/* The cell of LspWalk.waiting that stands for all behind it, too. */
+/* The cell of LspWalk.waiting that stands for all behind it, too; it is not the first. */
 #define LSP_LAST_WAITING 31u
 
 /* How far the ray has come: it enters `cell` at t, by a side across `axis`, -1 where it begins there. Between passes
@@ -45,7 +45,7 @@ struct LspWalk {
   float t;
   int axis;
   float t_last; /* where it leaves the grid, or ends */
-  ivec3 exact_cell; /* of ref; it has come out of it at t */
+  ivec3 exact_cell; /* of ref; it has come out of it at t. Of cells that wait the first */
   float exact_t;    /* where it entered that */
   uint step;    /* cells so far, from the beginning on */
   uint waiting; /* by step, bits: cells that wait */
@@ -286,29 +286,19 @@ LSP_STEP bool lsp_cell_answer(LspScene scene, LspSetup s, LspQuery q, LspCellRay
       }
     }
   }
-  if (exactly && lsp_walk.mode == LSP_WALK_WAITS) {
-    lsp_walk.waiting |= lsp_step_bit(lsp_walk.step - 1u);
-  } else if (exactly) {
-    lsp_walk.ref = index | LSP_LEAF_BIT;
-    lsp_walk.exact_cell = cell;
-    lsp_walk.exact_t = t;
+  if (exactly) {
+    bool waits = lsp_walk.mode == LSP_WALK_WAITS && (lsp_walk.waiting != 0u || lsp_walk.step <= LSP_LAST_WAITING);
+    if (!waits || lsp_walk.waiting == 0u) {
+      lsp_walk.exact_cell = cell;
+      lsp_walk.exact_t = t;
+    }
+    if (waits) {
+      lsp_walk.waiting |= lsp_step_bit(lsp_walk.step - 1u);
+    } else {
+      lsp_walk.ref = index | LSP_LEAF_BIT;
+    }
   }
   return over && !exactly;
-}
-
-/* To where the ray begins, or enters the grid. */
-LSP_STEP void lsp_enter(LspCellGrid grid, LspSetup s, LspCellRay r) {
-  precise vec3 a = (vec3(0.0f, 0.0f, 0.0f) - r.origin) * r.inverse;
-  precise vec3 b = (lsp_cell_dims(grid) - r.origin) * r.inverse;
-  vec3 first = vec3(lsp_min(a.x, b.x), lsp_min(a.y, b.y), lsp_min(a.z, b.z));
-  vec3 last = vec3(lsp_max(a.x, b.x), lsp_max(a.y, b.y), lsp_max(a.z, b.z));
-  float t_in = lsp_max(lsp_max(first.x, first.y), first.z);
-  bool outside = t_in > s.tmin;
-  lsp_walk.t_last = lsp_min(lsp_min(lsp_min(last.x, last.y), last.z), s.tmax);
-  lsp_walk.t = outside ? t_in : s.tmin;
-  lsp_walk.axis = !outside ? -1 : (t_in == first.x ? 0 : (t_in == first.y ? 1 : 2));
-  lsp_walk.cell = lsp_cell_at(grid, lsp_cell_point(r, lsp_walk.t));
-  lsp_walk.step = 0u;
 }
 
 /* To the first cell of the ray; where it begins in it, through it. Only here origin tables are asked: apart from the loop
@@ -316,10 +306,22 @@ LSP_STEP void lsp_enter(LspCellGrid grid, LspSetup s, LspCellRay r) {
 LSP_STEP void lsp_begin(LspScene scene, LspSetup s, LspQuery q) {
   LspCellGrid grid = lsp_load_header(scene).cells;
   LspCellRay r = lsp_cell_ray(grid, s);
-  lsp_enter(grid, s, r);
+  vec3 dims = lsp_cell_dims(grid);
+  precise vec3 a = (vec3(0.0f, 0.0f, 0.0f) - r.origin) * r.inverse;
+  precise vec3 b = (dims - r.origin) * r.inverse;
+  vec3 first = vec3(lsp_min(a.x, b.x), lsp_min(a.y, b.y), lsp_min(a.z, b.z));
+  vec3 last = vec3(lsp_max(a.x, b.x), lsp_max(a.y, b.y), lsp_max(a.z, b.z));
+  float t_in = lsp_max(lsp_max(first.x, first.y), first.z);
+  bool outside = t_in > s.tmin;
+  lsp_walk.t_last = lsp_min(lsp_min(lsp_min(last.x, last.y), last.z), s.tmax);
+  lsp_walk.t = outside ? t_in : s.tmin;
+  lsp_walk.axis = !outside ? -1 : (t_in == first.x ? 0 : (t_in == first.y ? 1 : 2));
+  vec3 p = lsp_cell_point(r, lsp_walk.t);
+  lsp_walk.cell = lsp_cell_at(grid, p);
   lsp_walk.ref = lsp_walk.t < lsp_walk.t_last ? 0u : LSP_NONE;
   lsp_walk.exact_cell = lsp_walk.cell;
   lsp_walk.exact_t = lsp_walk.t;
+  lsp_walk.step = 0u;
   lsp_walk.closed = false;
   lsp_walk.best = lsp_no_best(s);
   lsp_walk.any_hit = (q.flags & LSP_TRACE_ANY_HIT) != 0u;
@@ -330,7 +332,7 @@ LSP_STEP void lsp_begin(LspScene scene, LspSetup s, LspQuery q) {
   lsp_walk.counts = lsp_no_counts();
   lsp_stack_ref[0] = lsp_walk.ref;
   ivec3 cell = lsp_walk.cell;
-  if (lsp_walk.axis >= 0 || lsp_walk.ref == LSP_NONE) return;
+  if (outside || lsp_walk.ref == LSP_NONE) return;
   lsp_walk.step = 1u;
   lsp_walk.counts.nodes = 1u;
   uint word = lsp_load_cell_word(scene, (uint(cell.z) * grid.cells_y + uint(cell.y)) * grid.cells_x + uint(cell.x));
@@ -340,7 +342,6 @@ LSP_STEP void lsp_begin(LspScene scene, LspSetup s, LspQuery q) {
     uint index = word & ~LSP_CELL_FILLED;
     vec3 corner = lsp_cell_corner(cell);
     uint face_out = 2u * uint(pass.axis_out) + lsp_ahead(r, pass.axis_out);
-    vec3 p = lsp_cell_point(r, lsp_walk.t);
     LspCellLook look = lsp_cell_origin(grid, lsp_load_cell_origins(scene, index), p - corner, pass.to - corner,
                                        pass.axis_out, face_out);
     /* A ray that ends within the grid may miss what is beyond. */
@@ -359,18 +360,6 @@ LSP_STEP void lsp_begin(LspScene scene, LspSetup s, LspQuery q) {
   lsp_walk.axis = pass.axis_out;
 }
 
-/* Whether a ray that has come to its end without a hit begins again: for the cells that wait, or where a miss is a
- * mistake. */
-LSP_STEP bool lsp_begins_again(LspCellGrid grid, LspSetup s, LspCellRay r) {
-  bool waits = lsp_walk.mode == LSP_WALK_WAITS && lsp_walk.waiting != 0u;
-  if (!waits && !lsp_walk.closed) return false;
-  lsp_walk.mode = waits ? LSP_WALK_MAKES_UP : LSP_WALK_AGAIN;
-  lsp_walk.closed = waits && lsp_walk.closed;
-  lsp_enter(grid, s, r);
-  if (lsp_walk.axis < 0) lsp_walk.axis = 0; /* it begins in no table: whatever is looked up there is not heeded */
-  return true;
-}
-
 /* From cell to cell until a table answers, or a cell is to be traced exactly, or the ray is over. */
 LSP_STEP void lsp_advance(LspScene scene, LspSetup s, LspQuery q) {
   LspCellGrid grid = lsp_load_header(scene).cells;
@@ -378,15 +367,27 @@ LSP_STEP void lsp_advance(LspScene scene, LspSetup s, LspQuery q) {
   uint most = grid.cells_x + grid.cells_y + grid.cells_z;
   bool over = lsp_walk.best.triangle != LSP_NONE;
   while (!over && lsp_walk.ref == 0u && lsp_walk.step < most) {
-    over = !(lsp_walk.t < lsp_walk.t_last) || uint(lsp_walk.cell.x) >= grid.cells_x ||
-           uint(lsp_walk.cell.y) >= grid.cells_y || uint(lsp_walk.cell.z) >= grid.cells_z ||
-           (lsp_walk.mode == LSP_WALK_MAKES_UP && lsp_walk.waiting == 0u);
-    if (over) over = !lsp_begins_again(grid, s, r);
+    ivec3 cell = lsp_walk.cell;
+    float t = lsp_walk.t;
+    bool made_up = lsp_walk.mode == LSP_WALK_MAKES_UP && lsp_walk.waiting == 0u;
+    over = made_up || !(t < lsp_walk.t_last) || uint(cell.x) >= grid.cells_x || uint(cell.y) >= grid.cells_y || uint(cell.z) >= grid.cells_z;
+    if (over && lsp_walk.mode == LSP_WALK_WAITS && lsp_walk.waiting != 0u) {
+      over = false;
+      lsp_walk.mode = LSP_WALK_MAKES_UP;
+      lsp_walk.step = uint(bitCount((lsp_walk.waiting & (~lsp_walk.waiting + 1u)) - 1u)); /* the first */
+      t = lsp_walk.exact_t;
+      cell = lsp_walk.exact_cell;
+    } else if (over && lsp_walk.closed) {
+      over = false;
+      lsp_walk.closed = false;
+      lsp_walk.mode = LSP_WALK_AGAIN;
+      lsp_walk.step = 0u;
+      t = s.tmin;
+      cell = lsp_cell_at(grid, lsp_cell_point(r, t));
+    }
     if (over) break;
     lsp_walk.step += 1u;
     lsp_walk.counts.nodes += 1u;
-    ivec3 cell = lsp_walk.cell;
-    float t = lsp_walk.t;
     uint word = lsp_load_cell_word(scene, (uint(cell.z) * grid.cells_y + uint(cell.y)) * grid.cells_x + uint(cell.x));
     bool filled = (word & LSP_CELL_FILLED) != 0u;
     LspCellPassage pass = lsp_cell_pass(r, cell, filled ? 0 : int(word & LSP_CELL_MAX_JUMP), t);
