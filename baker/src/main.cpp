@@ -163,7 +163,7 @@ void add_reading_options(CLI::App& app, Arguments& a) {
 void add_machine_options(CLI::App& app, Arguments& a) {
   app.add_option("--align", a.align, "Alignment of sections in bytes; 0: 4096, of the smallest files 256")
       ->check(CLI::IsMember({0, 256, 4096, 65536}));
-  app.add_option("--threads", a.threads, "Threads, 0: all cores")->check(CLI::Range(0u, 1024u));
+  add_threads(app, a.threads, "Threads");
   add_size_option(
       app, "--memory-limit", a.memory_limit,
       "Memory the bake may use, as 2GiB; Line Spaces beyond it wait in temporary files beside the "

@@ -296,8 +296,7 @@ int main(int argc, char** argv) {
                  "Where rays are traced (default cpu); of a scene of instances vulkan needs assets "
                  "with cells or wide nodes")
       ->check(CLI::IsMember({"cpu", "vulkan"}));
-  app.add_option("--threads", a.options.threads, "Threads of the CPU (default: all)")
-      ->check(CLI::Range(1, 1024));
+  add_threads(app, a.options.threads, "Threads of the CPU");
   arrange_help(
       app, "lsp-render room.lsp -o room.png --effect diffuse --mode approximate",
       {{"What most people need",

@@ -229,8 +229,7 @@ int main(int argc, char** argv) {
                "Fewer rays, bakes, sizes and pictures: a few minutes for six scenes");
   app.add_flag("--large", arguments.large, "In the paper's table also what takes gigabytes a scene");
   app.add_flag("--no-vulkan", arguments.no_vulkan, "Measure the CPU only");
-  app.add_option("--threads", arguments.threads, "What 'all threads' means (default: all)")
-      ->check(CLI::Range(1, 1024));
+  add_threads(app, arguments.threads, "What 'all threads' means");
   arrange_help(app, "lsp-bench room.gltf -o report --quick",
                {{"What most people need",
                  {"SCENE", "--output FOLDER", "--suite", "--quick", "--no-vulkan", "--threads"}},

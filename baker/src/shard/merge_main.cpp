@@ -146,7 +146,7 @@ int main(int argc, char** argv) {
   app.option_defaults()->always_capture_default();
   app.add_option("PART", a.parts, "All parts of a bake")->required();
   app.add_option("-o,--output", a.output, "The .lsp file to write")->required();
-  app.add_option("--threads", a.threads, "Threads, 0: all cores")->check(CLI::Range(0u, 1024u));
+  add_threads(app, a.threads, "Threads");
   add_common_options(app, "lsp-merge", a.common);
   arrange_help(app, "lsp-merge room.*.part -o room.lsp",
                {{"Options", {"PART", "--output FILE", "--threads"}}});

@@ -147,6 +147,12 @@ class HelpText : public CLI::Formatter {
   std::string example_;
 };
 
+// --threads, 0 in all programs: all cores.
+template <class Number>
+void add_threads(CLI::App& app, Number& threads, const std::string& what) {
+  app.add_option("--threads", threads, what + ", 0: all cores")->check(CLI::Range(0, 1024));
+}
+
 // After the options have been added. What no group names comes after them all.
 inline void arrange_help(CLI::App& app, const std::string& example, std::vector<HelpGroup> groups) {
   for (HelpGroup& group : groups)
