@@ -29,6 +29,8 @@ TEST(Interface, NamesEveryStatus) {
                                   LSP_ERROR_LIMIT, static_cast<lsp_status>(4)})
     EXPECT_TRUE(names.insert(lsp_status_string(status)).second) << lsp_status_string(status);
   EXPECT_TRUE(names.count("unknown status"));
+  // Instances answer it, too, where no file is at fault.
+  EXPECT_STREQ(lsp_status_string(LSP_ERROR_INVALID), "not valid");
 }
 
 TEST(Interface, RefusesOptionsThatItDoesNotKnow) {
