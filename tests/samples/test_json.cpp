@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
+#include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -136,6 +137,41 @@ TEST_F(JsonOfFailures, WhatIsWrongWithAValueIsSaidPlainly) {
   expect_failure("lsp-compare", "none.pfm none.pfm --max-rmse -1", 1, "-1 is no number from 0 to");
   expect_failure("lsp-compare", ". none.pfm", 2, "is a folder");
   expect_failure("lsp-sample-scene", "scene.obj", 1, "written as .glb");
+}
+
+// A judge of pictures does not call a broken one equal, and names it.
+TEST_F(JsonOfFailures, PicturesThatCannotBeCompared) {
+  Picture picture(3, 2);
+  const auto save = [&](const char* name) {
+    write_picture((folder_.path() / name).string(), picture, Transfer::kDisplay);
+  };
+  save("good.pfm");
+  for (const float broken : {NAN, INFINITY, -INFINITY}) {
+    picture.pixels[4].y = broken;
+    save("broken.pfm");
+    for (const char* words : {"good.pfm broken.pfm", "broken.pfm good.pfm", "broken.pfm broken.pfm"}) {
+      const Outcome failed = expect_failure("lsp-compare", words, 3, "pixel 1,1 (from the upper left)");
+      EXPECT_EQ(failed.json.value("file", ""), "broken.pfm");
+    }
+  }
+  picture = Picture(2, 3);
+  save("turned.pfm");
+  const Outcome failed = expect_failure("lsp-compare", "good.pfm turned.pfm -o difference.png", 3,
+                                        "has 2x3 pixels, good.pfm 3x2");
+  EXPECT_EQ(failed.json.value("file", ""), "turned.pfm");
+  EXPECT_FALSE(std::filesystem::exists(folder_.path() / "difference.png"));
+}
+
+// A difference is not written as 0, nor a share of a mean that is none.
+TEST_F(JsonOfFailures, SmallDifferencesHaveDigits) {
+  Picture picture(2, 2);
+  write_picture((folder_.path() / "black.pfm").string(), picture, Transfer::kDisplay);
+  for (glm::vec3& pixel : picture.pixels) pixel = glm::vec3(2e-7f);
+  write_picture((folder_.path() / "near.pfm").string(), picture, Transfer::kDisplay);
+  expect_failure("lsp-compare", "black.pfm near.pfm --max-rmse 1e-8", 7,
+                 "RMSE 2e-07 against black.pfm is over 1e-08");
+  EXPECT_EQ(test::shell("lsp-compare black.pfm near.pfm >out 2>err", folder_.path()), 0);
+  EXPECT_EQ(test::read_bytes(folder_.path() / "out").find("of the mean"), std::string::npos);
 }
 
 // What was found out is there, too, in the same object.
