@@ -174,6 +174,22 @@ TEST_F(JsonOfFailures, SmallDifferencesHaveDigits) {
   EXPECT_EQ(test::read_bytes(folder_.path() / "out").find("of the mean"), std::string::npos);
 }
 
+// The page is not written over what it is made of, and broken pictures make none.
+TEST_F(JsonOfFailures, PagesOfTheDemo) {
+  for (const char* name : {"bake.json", "exact.json", "approx.json", "compare.json", "curve_fast.json"})
+    write(name, "{}");
+  for (const char* name : {"exact.png", "approx.png", "difference.png"}) write(name, "no picture");
+  for (const char* name : {"bake.json", "compare.json", "curve_fast.json", "exact.png"}) {
+    const std::string before = test::read_bytes(folder_.path() / name);
+    expect_failure("lsp-demo-report", std::string(". -o ") + name, 1, "is read, too");
+    EXPECT_EQ(test::read_bytes(folder_.path() / name), before) << name;
+  }
+  expect_failure("lsp-demo-report", ". -o no/such/folder/page.html", 2, "there is no folder");
+  const Outcome failed = expect_failure("lsp-demo-report", ". -o page.html", 3, "is no .png picture");
+  EXPECT_EQ(failed.json.value("file", ""), "./exact.png");
+  EXPECT_FALSE(std::filesystem::exists(folder_.path() / "page.html"));
+}
+
 // What was found out is there, too, in the same object.
 TEST_F(JsonOfFailures, FiguresAndErrorAreOneObject) {
   Picture picture(2, 2);
