@@ -190,6 +190,24 @@ TEST_F(JsonOfFailures, PagesOfTheDemo) {
   EXPECT_FALSE(std::filesystem::exists(folder_.path() / "page.html"));
 }
 
+// An option that changes nothing says so, where the run is not to be quiet.
+TEST_F(JsonOfFailures, WhatDoesNothingIsSaid) {
+  write_picture((folder_.path() / "black.pfm").string(), Picture(2, 2), Transfer::kDisplay);
+  const std::pair<const char*, const char*> lines[] = {
+      {"lsp-compare black.pfm black.pfm --factor 9", "--factor does nothing"},
+      {"lsp-sample-scene plane.glb --scene plane --no-masks", "--no-masks does nothing"}};
+  for (const auto& [line, said] : lines) {
+    EXPECT_EQ(test::shell(std::string(line) + " >out 2>err", folder_.path()), 0) << line;
+    EXPECT_NE(test::read_bytes(folder_.path() / "err").find(said), std::string::npos) << line;
+    EXPECT_EQ(test::shell(std::string(line) + " --quiet >out 2>err", folder_.path()), 0) << line;
+    EXPECT_EQ(test::read_bytes(folder_.path() / "err"), "") << line;
+  }
+  EXPECT_EQ(test::shell("lsp-sample-scene grove.glb --scene grove --triangles 4000 --no-masks >out 2>err",
+                        folder_.path()),
+            0);
+  EXPECT_EQ(test::read_bytes(folder_.path() / "err"), "");
+}
+
 // What was found out is there, too, in the same object.
 TEST_F(JsonOfFailures, FiguresAndErrorAreOneObject) {
   Picture picture(2, 2);
