@@ -267,7 +267,10 @@ extern "C" lsp_status lsp_instances_build(const lsp_scene* const* assets, uint32
     return lsp::fail(error, LSP_ERROR_LIMIT, 0,
                      "%u instances need %llu bytes at a multiple of 16; see lsp_instances_bytes", count,
                      static_cast<unsigned long long>(lsp_instances_bytes(count)));
-  if (count == 0) return lsp::succeed(error);
+  if (count == 0) {  // a pipeline for what is placed later is planned from the assets all the same
+    *out = {assets, nullptr, nullptr, nullptr, asset_count, 0};
+    return lsp::succeed(error);
+  }
   auto* const records = static_cast<lsp_instance_record*>(memory);
   auto* const nodes = reinterpret_cast<lsp_instance_node*>(records + count);
   for (uint32_t i = 0; i < count; ++i) {

@@ -70,6 +70,7 @@ extern "C" lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options*
                                 LspHit* hits, uint64_t count, lsp_trace_counts* counts, lsp_error* error) {
   if (const lsp_status status = lsp::check_options(*options, error); status != LSP_OK) return status;
   if (const lsp_status status = lsp::check_scene(*scene, *options, error); status != LSP_OK) return status;
+  lsp::succeed(error);  // nothing fails from here on
   const uint32_t features = scene->header->required_features;
   const bool approximate = lsp::is_approximate(*scene, *options);
   const bool partial = (features & LSP_FEATURE_COVERAGE) != 0;

@@ -208,6 +208,7 @@ extern "C" lsp_status lsp_trace_instances(const lsp_instances* instances, const 
     if (const lsp_status status = lsp::check_scene(*instances->assets[i], *options, &fault); status != LSP_OK)
       return lsp::fail(error, status, 0, "asset %u: %s", i, fault.message);
   }
+  lsp::succeed(error);
   lsp::InstanceBatch batch(*instances, *options, mask, counts != nullptr, error);
   for (uint64_t first = 0; first < count; first += lsp::kBatch) {
     const auto size = static_cast<uint32_t>(std::min<uint64_t>(lsp::kBatch, count - first));

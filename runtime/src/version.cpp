@@ -10,7 +10,7 @@ extern "C" const char* lsp_status_string(lsp_status status) {
     case LSP_ERROR_FILE:
       return "the file cannot be read";
     case LSP_ERROR_INVALID:
-      return "not a valid .lsp file";
+      return "not valid";
     case LSP_ERROR_UNSUPPORTED:
       return "not supported";
     case LSP_ERROR_LIMIT:

@@ -4,7 +4,9 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <sstream>
+#include <vector>
 
 #include "lsp/command_line.h"
 #include "lsp/json_result.h"
@@ -28,6 +30,26 @@ nlohmann::json read_json(const std::string& path) {
   return json;
 }
 
+std::string read_png(const std::string& path) {
+  std::string bytes = read_file(path);
+  if (!bytes.starts_with("\x89PNG\r\n"))
+    throw Failure(Exit::kInvalid, path, "is no .png picture; run samples/demo.sh again");
+  return bytes;
+}
+
+constexpr const char* kDial[] = {"fast", "balanced", "accurate", "30", "10", "3", "1"};
+
+// All that the page may be made of.
+std::vector<std::filesystem::path> inputs_in(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> inputs;
+  for (const char* name : {"bake.json", "exact.json", "approx.json", "compare.json", "curve_exact.json",
+                           "exact.png", "approx.png", "difference.png"})
+    inputs.push_back(folder / name);
+  for (const std::string name : kDial)
+    for (const char* kind : {"curve_", "curve_compare_"}) inputs.push_back(folder / (kind + name + ".json"));
+  return inputs;
+}
+
 }  // namespace
 }  // namespace lsp::sample
 
@@ -40,7 +62,7 @@ int main(int argc, char** argv) {
   std::string folder;
   std::string output;
   std::string title = "scene";
-  double validate_seconds = 0;
+  std::optional<double> validate_seconds;
   add_common_options(app, kProgram, common);
   app.add_option(
          "FOLDER", folder,
@@ -50,10 +72,12 @@ int main(int argc, char** argv) {
       ->required();
   app.add_option("-o,--output", output, "The page")->required();
   app.add_option("--title", title, "What was baked");
-  app.add_option("--validate-seconds", validate_seconds, "Time of lsp-validate")->check(CLI::Range(0.0, 1e9));
+  app.add_option("--validate-seconds", validate_seconds, "Time of lsp-validate (default: the page has none)")
+      ->check(CLI::Range(0.0, 1e9));
   arrange_help(app, "lsp-demo-report out/demo -o out/demo/report.html --title 'the atrium'",
                {{"Options", {"FOLDER", "--output FILE", "--title", "--validate-seconds SECONDS"}}});
   return run_program(kProgram, app, argc, argv, [&] {
+    check_output(output, inputs_in(folder));
     try {
       Figures figures{title,
                       validate_seconds,
@@ -65,15 +89,15 @@ int main(int argc, char** argv) {
                       {}};
       if (std::filesystem::exists(folder + "/curve_exact.json")) {
         figures.curve_exact = read_json(folder + "/curve_exact.json");
-        for (const std::string name : {"fast", "balanced", "accurate", "30", "10", "3", "1"}) {
+        for (const std::string name : kDial) {
           const std::string point = folder + "/curve_" + name + ".json";
           if (!std::filesystem::exists(point)) continue;
           figures.curve.push_back(
               {name, read_json(point), read_json(folder + "/curve_compare_" + name + ".json")});
         }
       }
-      const Pictures pictures{read_file(folder + "/exact.png"), read_file(folder + "/approx.png"),
-                              read_file(folder + "/difference.png")};
+      const Pictures pictures{read_png(folder + "/exact.png"), read_png(folder + "/approx.png"),
+                              read_png(folder + "/difference.png")};
       write_file(output, make_page(figures, pictures));
       if (common.json) {
         json_result() = {{"report", output}};
@@ -81,8 +105,9 @@ int main(int argc, char** argv) {
         std::cout << make_summary(figures) << "report: " << output << "\n";
       }
     } catch (const nlohmann::json::exception& e) {
-      throw Failure(Exit::kInvalid, folder,
-                    std::string("a figure is missing: ") + e.what() + "; run samples/demo.sh again");
+      throw Failure(
+          Exit::kInvalid, folder,
+          std::string("a figure is missing or of another kind: ") + e.what() + "; run samples/demo.sh again");
     }
   });
 }

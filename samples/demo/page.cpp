@@ -307,7 +307,7 @@ std::string the_bake(const Figures& f) {
   html += fact("file", megabytes(number(f.bake, "file_bytes")));
   html += fact("time to bake", format("%.2f s", total_seconds(f.bake.at("seconds"))));
   html += fact("peak memory", megabytes(number(f.bake, "peak_memory_bytes")));
-  html += fact("time to validate", format("%.2f s", f.validate_seconds));
+  if (f.validate_seconds) html += fact("time to validate", format("%.2f s", *f.validate_seconds));
   return html + "</dl>\n";
 }
 
@@ -351,7 +351,7 @@ std::string make_summary(const Figures& f) {
                  total_seconds(f.bake.at("seconds")));
   for (const auto& item : f.bake.at("skipped")) text += "skipped:     " + item.get<std::string>() + "\n";
   for (const auto& item : f.bake.at("notes")) text += "note:        " + item.get<std::string>() + "\n";
-  text += format("validate:    %.2f s\n", f.validate_seconds);
+  if (f.validate_seconds) text += format("validate:    %.2f s\n", *f.validate_seconds);
   text += "device:      " + f.exact.at("device").get<std::string>() + " (" +
           f.exact.at("backend").get<std::string>() +
           "), file: " + f.exact.at("load_path").get<std::string>() + "\n";

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,7 +12,7 @@ namespace lsp::sample {
 // missing.
 struct Figures {
   std::string title;
-  double validate_seconds = 0;
+  std::optional<double> validate_seconds;  // nothing: not measured
   nlohmann::json bake;
   nlohmann::json exact;
   nlohmann::json approximate;

@@ -1,11 +1,27 @@
 // lsp-compare: how far apart two linear pictures are, in numbers and as a picture.
 #include <cmath>
+#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "compare.h"
 #include "lsp/command_line.h"
 #include "lsp/json_result.h"
 #include "lsp/output_file.h"
+
+namespace {
+
+// Short, and never 0 where it is not.
+std::string text(double value) {
+  char digits[32];
+  std::snprintf(digits, sizeof digits, "%g", value);
+  return digits;
+}
+
+std::string size_of(const lsp::sample::Picture& picture) {
+  return std::to_string(picture.width) + "x" + std::to_string(picture.height);
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
   using namespace lsp;
@@ -25,15 +41,21 @@ int main(int argc, char** argv) {
   app.add_option("--factor", factor, "Amplification of the difference picture (default 4)")
       ->check(CLI::Range(0.0f, 1e6f));
   app.add_option("--max-rmse", max_rmse, "Exit with 7 if the linear RMSE is larger")
-      ->check(CLI::Range(0.0, 1e30));
+      ->check(CLI::Range(0.0, 1e9));
   arrange_help(app, "lsp-compare exact.pfm approximate.pfm -o difference.png",
                {{"Options", {"REFERENCE.pfm", "TEST.pfm", "--output FILE", "--factor", "--max-rmse"}}});
   return run_program(kProgram, app, argc, argv, [&] {
     const std::filesystem::path inputs[] = {reference_path, test_path};
+    if (output.empty() && app.count("--factor") > 0 && !common.quiet)
+      std::cerr << kProgram << ": --factor does nothing: no --output asks for a difference picture\n";
     if (!output.empty()) check_picture_name(output);
     if (!output.empty()) check_output(output, inputs);
     const Picture reference = read_pfm(reference_path);
     const Picture test = read_pfm(test_path);
+    if (reference.width != test.width || reference.height != test.height)
+      throw Failure(Exit::kInvalid, test_path,
+                    "has " + size_of(test) + " pixels, " + reference_path + " " + size_of(reference) +
+                        "; render both with the same --size");
     const Comparison c = compare(reference, test);
     if (!output.empty()) write_picture(output, difference(reference, test, factor), Transfer::kDisplay);
     const double far_share =
@@ -51,14 +73,14 @@ int main(int argc, char** argv) {
           std::isfinite(c.psnr_db) ? nlohmann::ordered_json(c.psnr_db) : nlohmann::ordered_json();
       json_result() = json;
     } else if (!common.quiet) {
-      std::cout << "RMSE " << c.rmse << ", mean absolute " << c.mean_absolute << " (" << 100 * c.relative_mean
-                << " % of the mean), PSNR " << c.psnr_db << " dB, " << 100 * far_share
+      std::cout << "RMSE " << c.rmse << ", mean absolute " << c.mean_absolute;
+      if (c.mean_reference > 0) std::cout << " (" << 100 * c.relative_mean << " % of the mean)";
+      std::cout << ", PSNR " << c.psnr_db << " dB, " << 100 * far_share
                 << " % of pixels differ visibly (over 5 % in a displayed channel)\n";
     }
     if (max_rmse >= 0 && !(c.rmse <= max_rmse)) {
       throw Failure(Exit::kDiffer, test_path,
-                    "RMSE " + std::to_string(c.rmse) + " against " + reference_path + " is over " +
-                        std::to_string(max_rmse));
+                    "RMSE " + text(c.rmse) + " against " + reference_path + " is over " + text(max_rmse));
     }
   });
 }

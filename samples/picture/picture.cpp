@@ -118,6 +118,14 @@ Picture read_pfm(const std::filesystem::path& path) {
       }
     }
   }
+  for (size_t i = 0; i < picture.pixels.size(); ++i) {
+    const glm::vec3 pixel = picture.pixels[i];
+    if (std::isfinite(pixel.x) && std::isfinite(pixel.y) && std::isfinite(pixel.z)) continue;
+    const size_t row = i / static_cast<size_t>(width), column = i % static_cast<size_t>(width);
+    throw Failure(Exit::kInvalid, path.string(),
+                  "pixel " + std::to_string(column) + "," + std::to_string(row) +
+                      " (from the upper left) is infinite or no number; render it again");
+  }
   return picture;
 }
 

@@ -38,7 +38,7 @@ void write_picture(const std::filesystem::path& path, const Picture& picture, Tr
 std::string rgba_png(int width, int height, const std::vector<uint8_t>& rgba);
 
 // Reads a colour .pfm file, of either byte order. Hostile bytes are fine. Throws lsp::Failure: kFile where it
-// cannot be read, kInvalid where it is not such a file.
+// cannot be read, kInvalid where it is not such a file or a pixel of it is not finite.
 Picture read_pfm(const std::filesystem::path& path);
 
 }  // namespace lsp::sample

@@ -34,7 +34,8 @@ int main(int argc, char** argv) {
     check_output(output);
     const auto start = std::chrono::steady_clock::now();
     Scene scene = make_scene(name, triangles == 0 ? Detail{} : detail_for(name, triangles));
-    if (no_masks) take_masks_off(scene);
+    if (no_masks && !take_masks_off(scene) && !common.quiet)
+      std::cerr << kProgram << ": " << output << ": --no-masks does nothing: " << name << " has no masks\n";
     const std::string bytes = to_glb(scene);
     write_file(output, bytes);
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;

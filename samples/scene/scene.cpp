@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "lsp/program.h"
 #include "ornaments.h"
@@ -78,8 +79,10 @@ Scene make_scene(const std::string& name, const Detail& detail) {
                 "there is no scene '" + name + "'; choose atrium, grove, spheres, plane, objects or stadium");
 }
 
-void take_masks_off(Scene& scene) {
-  for (Material& material : scene.materials) material.masked = false;
+bool take_masks_off(Scene& scene) {
+  bool any = false;
+  for (Material& material : scene.materials) any |= std::exchange(material.masked, false);
+  return any;
 }
 
 Detail detail_for(const std::string& name, uint64_t triangles) {

@@ -82,8 +82,8 @@ Scene make_plane(const Detail& detail);
 Scene make_objects(const Detail& detail);
 Scene make_stadium(const Detail& detail);
 
-// Leaves and whatever else has a mask become solid.
-void take_masks_off(Scene& scene);
+// Leaves and whatever else has a mask become solid. False: nothing has one.
+bool take_masks_off(Scene& scene);
 
 // The detail at which the scene has about `triangles` triangles (as near as whole steps allow). Throws
 // lsp::Failure (Exit::kUsage) where that misses the wish by more than a quarter.

@@ -10,6 +10,7 @@
 #include "lsp/command_line.h"
 #include "lsp/in_chunks.hpp"
 #include "lsp/json_result.h"
+#include "lsp/output_file.h"
 #include "machine.h"
 #include "timing.h"
 
@@ -34,6 +35,11 @@ constexpr Suite kSuites[] = {{"pareto", pareto_suite},      {"peers", peers_suit
                              {"paper", paper_suite},        {"pictures", pictures_suite},
                              {"scaling", scaling_suite},    {"stress", stress_suite},
                              {"instances", instances_suite}};
+
+bool wants(const Arguments& arguments, const std::string& suite) {
+  return arguments.suites.empty() ||
+         std::find(arguments.suites.begin(), arguments.suites.end(), suite) != arguments.suites.end();
+}
 
 // What the run has used so far: this process and the programs that it ran.
 struct Cost {
@@ -129,6 +135,7 @@ void add_scenes(Context& context, const Arguments& arguments) {
   if (error)
     throw Failure(Exit::kFile, context.cache.string(),
                   "cannot be made: " + error.message() + "; give another folder with -o");
+  for (const char* name : {"report.html", "report.json"}) check_output(context.cache.parent_path() / name);
   for (const std::string& scene : arguments.scenes) {
     context.progress("bake " + scene);
     try {
@@ -144,6 +151,8 @@ void add_scenes(Context& context, const Arguments& arguments) {
 
 void run(const Arguments& arguments, const CommonOptions& common) {
   namespace fs = std::filesystem;
+  if (arguments.large && !common.quiet && !wants(arguments, "paper"))
+    std::cerr << "lsp-bench: --large does nothing: of the suites only paper has more for it\n";
   Context context;
   context.quick = arguments.quick;
   context.large = arguments.large;
@@ -178,10 +187,7 @@ void run(const Arguments& arguments, const CommonOptions& common) {
   running.add_cost("first bakes, truth", cost);
   std::vector<Section> sections;
   for (const Suite& suite : kSuites) {
-    if (!arguments.suites.empty() &&
-        std::find(arguments.suites.begin(), arguments.suites.end(), suite.name) == arguments.suites.end()) {
-      continue;
-    }
+    if (!wants(arguments, suite.name)) continue;
     cost = Cost::so_far();
     Section section{suite.name, suite.name, {}, {}, {}, {}};
     context.guarded(section, "the whole suite", [&] { section = suite.run(context); });
@@ -224,6 +230,7 @@ int main(int argc, char** argv) {
                  "paper, pareto, scaling, peers, stress, pictures or instances; may be repeated (default: "
                  "all; of six "
                  "scenes on two cores that is more than half an hour)")
+      ->allow_extra_args(false)  // a word behind it may be a scene
       ->check(CLI::IsMember({"paper", "pareto", "scaling", "peers", "stress", "pictures", "instances"}));
   app.add_flag("--quick", arguments.quick,
                "Fewer rays, bakes, sizes and pictures: a few minutes for six scenes");

@@ -84,6 +84,20 @@ TEST_F(BenchProgram, SaysWhatIsWrong) {
   EXPECT_FALSE(fs::exists(directory_ / "out" / "report.html"));
 }
 
+// A suite takes one word: the next may be a scene. And what cannot be written is known before the work.
+TEST_F(BenchProgram, IsRefusedBeforeItMeasures) {
+  const std::string input = (directory_ / "room.ply").string();
+  write_ply(input, room_of_spheres(20));
+  const fs::path out = directory_ / "out";
+  fs::create_directories(out / "report.html");
+  const ProcessResult run =
+      bench({"--suite", "peers", input, "-o", out.string(), "--quick", "--no-vulkan", "--large"});
+  EXPECT_EQ(run.exit_code, 2) << run.errors;
+  EXPECT_NE(run.errors.find("report.html: is a folder"), std::string::npos) << run.errors;
+  EXPECT_NE(run.errors.find("--large does nothing"), std::string::npos) << run.errors;
+  EXPECT_FALSE(fs::exists(out / "peers.csv"));
+}
+
 TEST_F(BenchProgram, WritesAReport) {
   const fs::path input = directory_ / "room.ply", out = directory_ / "out";
   write_ply(input, room_of_spheres(3000));

@@ -382,6 +382,23 @@ TEST(Instances, NoneAtAll) {
   EXPECT_THROW(none.trace({0x40, 0}, 255, {&ray, 1}, {&hit, 1}), Error);
 }
 
+// A level without its objects yet: shaders are planned for its assets before the first is placed.
+TEST(Instances, NoneOfSomeAssets) {
+  const Asset asset;
+  const Instances none({&asset.scene, &asset.scene}, {nullptr, 0});
+  EXPECT_EQ(none.view().count, 0u);
+  ASSERT_EQ(none.view().asset_count, 2u);
+  EXPECT_EQ(none.view().assets[1], &asset.scene);
+  const LspRay ray = {{0, 0, -9}, 0, {0, 0, 1}, 100};
+  for (const uint32_t flags : {0u, LSP_TRACE_APPROXIMATE, LSP_TRACE_OCCLUSION}) {
+    LspHit hit{};
+    lsp_trace_counts counts{};
+    none.trace({flags, 0}, 255, {&ray, 1}, {&hit, 1}, &counts);
+    EXPECT_TRUE(std::isinf(hit.t));
+    EXPECT_EQ(counts.rays, 1u);
+  }
+}
+
 TEST(Instances, OffsetGrowsWithTheInstance) {
   const Asset asset;
   const lsp_instance place = at(0, {0, -3, 0, 0, 3, 0, 0, 0, 0, 0, 5, 0});

@@ -4,7 +4,7 @@
 #include <set>
 #include <string>
 
-#include "lsp/lsp.h"
+#include "lsp/lsp_instances.h"
 #include "lsp/program.h"
 #include "scene_builder.h"
 
@@ -29,6 +29,8 @@ TEST(Interface, NamesEveryStatus) {
                                   LSP_ERROR_LIMIT, static_cast<lsp_status>(4)})
     EXPECT_TRUE(names.insert(lsp_status_string(status)).second) << lsp_status_string(status);
   EXPECT_TRUE(names.count("unknown status"));
+  // Instances answer it, too, where no file is at fault.
+  EXPECT_STREQ(lsp_status_string(LSP_ERROR_INVALID), "not valid");
 }
 
 TEST(Interface, RefusesOptionsThatItDoesNotKnow) {
@@ -53,6 +55,34 @@ TEST(Interface, RefusesOptionsThatItDoesNotKnow) {
       trace({LSP_TRACE_ALL_FLAGS | LSP_TRACE_MAX_LOSS | LSP_TRACE_OCCLUSION, 0, LSP_QUALITY_ACCURATE, 5}),
       LSP_OK);
   EXPECT_EQ(counts.rays, 1u);
+}
+
+// One lsp_error serves call after call: what an earlier one said must not be read as the last one's.
+TEST(Interface, SuccessClearsTheError) {
+  Bytes bytes = write_raw(build_parts({}));
+  lsp_scene scene;
+  ASSERT_EQ(lsp_open(bytes.data(), bytes.size(), &scene, nullptr), LSP_OK);
+  const LspRay ray = {{0, 0, -9}, 0, {0, 0, 1}, 100};
+  LspHit hit;
+  const lsp_trace_options exact = {}, approximate = {LSP_TRACE_APPROXIMATE, 0};
+  const lsp_scene* const assets[] = {&scene};
+  const lsp_instance place = {0, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}, 255, 0};
+  alignas(16) unsigned char memory[512];
+  lsp_instances instances;
+  ASSERT_EQ(lsp_instances_build(assets, 1, &place, 1, memory, sizeof memory, &instances, nullptr), LSP_OK);
+  const auto clears = [](auto call) {
+    lsp_error error = {LSP_ERROR_FILE, 7, "an earlier failure"};
+    return call(&error) == LSP_OK && error.status == LSP_OK && error.offset == 0 && error.message[0] == 0;
+  };
+  for (const uint64_t count : {0, 1}) {
+    for (const lsp_trace_options* options : {&exact, &approximate}) {
+      EXPECT_TRUE(clears(
+          [&](lsp_error* error) { return lsp_trace(&scene, options, &ray, &hit, count, nullptr, error); }));
+      EXPECT_TRUE(clears([&](lsp_error* error) {
+        return lsp_trace_instances(&instances, options, 255, &ray, &hit, count, nullptr, error);
+      }));
+    }
+  }
 }
 
 TEST(Interface, OffsetIsLargerWhereATableAnswered) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
+#include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -136,6 +137,75 @@ TEST_F(JsonOfFailures, WhatIsWrongWithAValueIsSaidPlainly) {
   expect_failure("lsp-compare", "none.pfm none.pfm --max-rmse -1", 1, "-1 is no number from 0 to");
   expect_failure("lsp-compare", ". none.pfm", 2, "is a folder");
   expect_failure("lsp-sample-scene", "scene.obj", 1, "written as .glb");
+}
+
+// A judge of pictures does not call a broken one equal, and names it.
+TEST_F(JsonOfFailures, PicturesThatCannotBeCompared) {
+  Picture picture(3, 2);
+  const auto save = [&](const char* name) {
+    write_picture((folder_.path() / name).string(), picture, Transfer::kDisplay);
+  };
+  save("good.pfm");
+  for (const float broken : {NAN, INFINITY, -INFINITY}) {
+    picture.pixels[4].y = broken;
+    save("broken.pfm");
+    for (const char* words : {"good.pfm broken.pfm", "broken.pfm good.pfm", "broken.pfm broken.pfm"}) {
+      const Outcome failed = expect_failure("lsp-compare", words, 3, "pixel 1,1 (from the upper left)");
+      EXPECT_EQ(failed.json.value("file", ""), "broken.pfm");
+    }
+  }
+  picture = Picture(2, 3);
+  save("turned.pfm");
+  const Outcome failed = expect_failure("lsp-compare", "good.pfm turned.pfm -o difference.png", 3,
+                                        "has 2x3 pixels, good.pfm 3x2");
+  EXPECT_EQ(failed.json.value("file", ""), "turned.pfm");
+  EXPECT_FALSE(std::filesystem::exists(folder_.path() / "difference.png"));
+}
+
+// A difference is not written as 0, nor a share of a mean that is none.
+TEST_F(JsonOfFailures, SmallDifferencesHaveDigits) {
+  Picture picture(2, 2);
+  write_picture((folder_.path() / "black.pfm").string(), picture, Transfer::kDisplay);
+  for (glm::vec3& pixel : picture.pixels) pixel = glm::vec3(2e-7f);
+  write_picture((folder_.path() / "near.pfm").string(), picture, Transfer::kDisplay);
+  expect_failure("lsp-compare", "black.pfm near.pfm --max-rmse 1e-8", 7,
+                 "RMSE 2e-07 against black.pfm is over 1e-08");
+  EXPECT_EQ(test::shell("lsp-compare black.pfm near.pfm >out 2>err", folder_.path()), 0);
+  EXPECT_EQ(test::read_bytes(folder_.path() / "out").find("of the mean"), std::string::npos);
+}
+
+// The page is not written over what it is made of, and broken pictures make none.
+TEST_F(JsonOfFailures, PagesOfTheDemo) {
+  for (const char* name : {"bake.json", "exact.json", "approx.json", "compare.json", "curve_fast.json"})
+    write(name, "{}");
+  for (const char* name : {"exact.png", "approx.png", "difference.png"}) write(name, "no picture");
+  for (const char* name : {"bake.json", "compare.json", "curve_fast.json", "exact.png"}) {
+    const std::string before = test::read_bytes(folder_.path() / name);
+    expect_failure("lsp-demo-report", std::string(". -o ") + name, 1, "is read, too");
+    EXPECT_EQ(test::read_bytes(folder_.path() / name), before) << name;
+  }
+  expect_failure("lsp-demo-report", ". -o no/such/folder/page.html", 2, "there is no folder");
+  const Outcome failed = expect_failure("lsp-demo-report", ". -o page.html", 3, "is no .png picture");
+  EXPECT_EQ(failed.json.value("file", ""), "./exact.png");
+  EXPECT_FALSE(std::filesystem::exists(folder_.path() / "page.html"));
+}
+
+// An option that changes nothing says so, where the run is not to be quiet.
+TEST_F(JsonOfFailures, WhatDoesNothingIsSaid) {
+  write_picture((folder_.path() / "black.pfm").string(), Picture(2, 2), Transfer::kDisplay);
+  const std::pair<const char*, const char*> lines[] = {
+      {"lsp-compare black.pfm black.pfm --factor 9", "--factor does nothing"},
+      {"lsp-sample-scene plane.glb --scene plane --no-masks", "--no-masks does nothing"}};
+  for (const auto& [line, said] : lines) {
+    EXPECT_EQ(test::shell(std::string(line) + " >out 2>err", folder_.path()), 0) << line;
+    EXPECT_NE(test::read_bytes(folder_.path() / "err").find(said), std::string::npos) << line;
+    EXPECT_EQ(test::shell(std::string(line) + " --quiet >out 2>err", folder_.path()), 0) << line;
+    EXPECT_EQ(test::read_bytes(folder_.path() / "err"), "") << line;
+  }
+  EXPECT_EQ(test::shell("lsp-sample-scene grove.glb --scene grove --triangles 4000 --no-masks >out 2>err",
+                        folder_.path()),
+            0);
+  EXPECT_EQ(test::read_bytes(folder_.path() / "err"), "");
 }
 
 // What was found out is there, too, in the same object.

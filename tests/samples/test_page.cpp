@@ -67,6 +67,15 @@ TEST(Page, EscapesWhatComesFromFiles) {
   EXPECT_NE(page.find("a &lt;note&gt;"), std::string::npos);
 }
 
+TEST(Page, SaysNothingOfATimeThatNobodyMeasured) {
+  Figures figures = example();
+  EXPECT_NE(make_page(figures, {}).find("time to validate"), std::string::npos);
+  EXPECT_NE(make_summary(figures).find("validate:    0.12 s"), std::string::npos);
+  figures.validate_seconds.reset();
+  EXPECT_EQ(make_page(figures, {}).find("time to validate"), std::string::npos);
+  EXPECT_EQ(make_summary(figures).find("validate:"), std::string::npos);
+}
+
 TEST(Page, SaysTheFigures) {
   const std::string page = make_page(example(), {});
   EXPECT_NE(page.find("1.50 times"), std::string::npos);

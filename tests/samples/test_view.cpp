@@ -440,6 +440,31 @@ TEST_F(View, MeshesAreBakedFirst) {
   EXPECT_EQ(view(file("bad.obj") + " --quiet --frames 1 2>/dev/null"), 3);
 }
 
+// Who ends it while it bakes finds nothing left of that; what is wrong with a mesh is in the report, too.
+TEST_F(View, BakesThatComeToNothing) {
+  ASSERT_EQ(test::shell("lsp-sample-scene " + file("hall.glb") + " --quiet"), 0);
+  std::filesystem::create_directories(file("temporary"));
+  for (const char* signal : {"TERM", "INT"}) {
+    EXPECT_EQ(test::shell("TMPDIR=" + file("temporary") + " timeout -s " + signal + " 1 lsp-view " +
+                          file("hall.glb") + " --frames 1 --quiet"),
+              124);
+    EXPECT_TRUE(std::filesystem::is_empty(file("temporary"))) << signal;
+  }
+  const auto failed = [&](const std::string& where, const char* mesh, int exit) {
+    EXPECT_EQ(test::shell("TMPDIR=" + where + " lsp-view " + file(mesh) + " --frames 1 --json 2>/dev/null >" +
+                          file("report.json")),
+              exit);
+    return nlohmann::json::parse(test::read_bytes(file("report.json")));
+  };
+  const nlohmann::json report = failed("/nonexistent", "hall.glb", 2);
+  EXPECT_EQ(report.value("file", ""), file("hall.glb"));
+  EXPECT_NE(report.value("error", "").find("set TMPDIR"), std::string::npos) << report;
+  std::ofstream(file("bad.obj")) << "f 1 2 3\n";
+  const nlohmann::json bad = failed(file("temporary"), "bad.obj", 3);
+  EXPECT_NE(bad.value("error", "").find("could not bake it: "), std::string::npos) << bad;
+  EXPECT_TRUE(std::filesystem::is_empty(file("temporary")));
+}
+
 TEST_F(View, ValidationHasNothingToSay) {
   for (const std::string scene : {"cells.lsp", "placed.json"}) {
     const int exit = view(file(scene) + " --quiet --frames 2 --split 0.5 --validation 2> " + file("said"));

@@ -29,7 +29,7 @@ LSP_API uint32_t lsp_version(void);
 typedef enum lsp_status {
   LSP_OK = 0,
   LSP_ERROR_FILE = 2,        /* the file cannot be read */
-  LSP_ERROR_INVALID = 3,     /* the bytes are not a valid .lsp file */
+  LSP_ERROR_INVALID = 3,     /* bytes that are no valid .lsp file, a transform without an inverse */
   LSP_ERROR_UNSUPPORTED = 5, /* a version, feature or section this library does not know, or a packed file */
   LSP_ERROR_LIMIT = 6,       /* a limit was exceeded: a buffer given is too small, a range too large */
 } lsp_status;

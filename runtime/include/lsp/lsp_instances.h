@@ -84,7 +84,7 @@ LSP_API uint64_t lsp_instances_bytes(uint32_t count);
  * determinant is under 2^-40 of the product of its columns' lengths) or that puts the asset beyond what a
  * float holds; an asset that is not there. LSP_ERROR_LIMIT: memory too small or not aligned, more than
  * LSP_MAX_INSTANCES. After an error `out` is empty and answers every ray with a miss. No instances at all is
- * not an error. */
+ * not an error: `out` has the assets alone then, for lsp_vulkan_plan_instances, say. */
 LSP_API lsp_status lsp_instances_build(const lsp_scene* const* assets, uint32_t asset_count,
                                        const lsp_instance* instances, uint32_t count, void* memory,
                                        uint64_t bytes, lsp_instances* out, lsp_error* error);

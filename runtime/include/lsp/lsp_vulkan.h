@@ -9,9 +9,9 @@
  * offset
  *                                                 +-- upload: copies straight from the mapping, in pieces
  *
- * Shaders: include lsp/lsp.glsl in your own and bind the scene's buffers to bindings 0 to 6, of an NTree to 8
- * (LSP_ADDRESSES defined where a section is too large for a storage buffer); or use the ready trace shader
- * here, which reads rays from a buffer and writes hits to another.
+ * Shaders: include lsp/lsp.glsl in your own and bind the scene's buffers where the plan says, to bindings 0
+ * to 11 (LSP_ADDRESSES defined where a section is too large for a storage buffer); or use the ready trace
+ * shader here, which reads rays from a buffer and writes hits to another.
  *
  * Files that lsp-validate has not passed: switch robustBufferAccess on. lsp_open has checked the file's
  * frame, not the indices inside its sections, and the shader does not check them again.
@@ -143,9 +143,9 @@ typedef struct lsp_vulkan_copy {
   uint64_t bytes;         /* of the piece */
 } lsp_vulkan_copy;
 
-/* The piece after *cursor (0 at first, then left alone), at most max_bytes long; 0 when there is none left.
- * Pieces of 1 MiB keep a cold mapping fast. Copy it to mapped device-local memory, or to a staging buffer and
- * record the transfer with lsp_vulkan_record_copy. */
+/* The piece after *cursor (0 at first, then left alone), at most max_bytes, not 0, long; 0 when there is none
+ * left. Pieces of 1 MiB keep a cold mapping fast. Copy it to mapped device-local memory, or to a staging
+ * buffer and record the transfer with lsp_vulkan_record_copy. */
 LSP_API int lsp_vulkan_next_copy(const lsp_scene* scene, const lsp_vulkan_plan* plan, uint64_t max_bytes,
                                  uint64_t* cursor, lsp_vulkan_copy* copy);
 
@@ -218,7 +218,8 @@ LSP_API void lsp_vulkan_layout_bindings(VkDescriptorSetLayoutBinding bindings[LS
 
 /* Points `set` at the scene's buffers (in the plan's order), and at rays, hits and counters. What the scene
  * has no buffer for is bound to the header's. `counters` may be VK_NULL_HANDLE for the shader that does not
- * count. */
+ * count; rays and hits may not, even where the engine's own shaders do not read them: any storage buffer will
+ * do then. */
 LSP_API void lsp_vulkan_write_descriptors(const lsp_vulkan_functions* functions, VkDevice device,
                                           VkDescriptorSet set, const lsp_vulkan_plan* plan,
                                           const VkBuffer* buffers, VkBuffer rays, VkBuffer hits,

@@ -39,6 +39,23 @@ if command -v spirv-cross >/dev/null; then
 else
   echo "without spirv-cross"
 fi
+
+# The commands of CMake, in a project that holds lsp.
+mkdir engine
+cp ao.comp engine
+echo 'int main(void) { return 0; }' >engine/main.c
+{
+  echo 'cmake_minimum_required(VERSION 3.25)'
+  echo 'project(engine LANGUAGES C CXX)'
+  echo "add_subdirectory($source lsp)"
+  echo 'add_executable(engine main.c)'
+  echo 'target_link_libraries(engine PRIVATE lsp::runtime)'
+  blocks INTEGRATION cmake
+} >engine/CMakeLists.txt
+cmake -G Ninja -S engine -B engine/build >engine/log && cmake --build engine/build --target ao_cells.spv >>engine/log ||
+  { cat engine/log; echo "INTEGRATION.md: its shader cannot be built by CMake"; exit 1; }
+cmp engine/build/ao_cells.spv ao_cells.spv || { echo "INTEGRATION.md: CMake builds another shader"; exit 1; }
+
 "$program" room.lsp | tee said
 grep -q '^256 rays went on, [1-9]' said && grep -q '^hits: [1-9]' said || { echo "INTEGRATION.md: its program meets nothing"; exit 1; }
 
