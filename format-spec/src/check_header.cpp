@@ -153,7 +153,9 @@ void check_grid(const LspHeader& header, Report& report) {
     }
   for (uint32_t dial : header.quality)
     if ((dial & 0xFF) > LSP_LOSS_UNKNOWN + 1 || dial >> 8 > LSP_LOSS_UNKNOWN + 1 ||
-        (dial != 0 && !has_cells(header))) {
+        (dial != 0 && !has_cells(header)) ||
+        (dial != LSP_DIAL_TABLES && has_cells(header) &&
+         (header.required_features & LSP_FEATURE_EXACT) == 0)) {
       LSP_HEADER_FINDING(kQualityRange, quality, "is " + hex(dial));
       break;
     }
