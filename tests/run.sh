@@ -21,9 +21,9 @@ done
 
 started=$SECONDS
 # What only the tests need: Debian packages are made, with manual pages; a project is built with Make; shaders become
-# HLSL and Metal's language; sources are formatted; a bake is divided by GNU parallel. And where nothing of the kind is
+# HLSL and Metal's language; sources are formatted; a bake is divided by GNU parallel; SPEC.md has a reader in Python. And where nothing of the kind is
 # there: the second reader runs on Node.js, the fuzzers are built with Clang.
-extra=(clang-format-14 doxygen dpkg-dev file help2man make parallel spirv-cross xvfb)
+extra=(clang-format-14 doxygen dpkg-dev file help2man make parallel python3-numpy spirv-cross xvfb)
 command -v npm >/dev/null || extra+=(nodejs npm)
 command -v clang++-14 >/dev/null || extra+=(clang-14)
 compgen -G '/usr/lib/llvm-14/lib/clang/*/lib/linux/libclang_rt.fuzzer-*.a' >/dev/null || extra+=(libclang-rt-14-dev)

@@ -279,13 +279,13 @@ void keep_tables_only(Baked& baked) {
 void leave_out_tables(Baked& baked, const std::string& reason) {
   baked.cell_grid = {};
   baked.cell_tables = {};
+  set_counts(baked);  // while the file is still one of cells: of another the counts of their sections stay
   LspHeader& h = baked.header;
   h.cells = {};
   for (uint32_t& dial : h.quality) dial = 0;
   baked.qualities = {};
   h.base_structure = LSP_BASE_WIDE;
   h.required_features = (h.required_features & ~LSP_FEATURE_CELLS) | LSP_FEATURE_WIDE | LSP_FEATURE_WIDE_BASE;
-  set_counts(baked);
   std::erase_if(baked.skipped, [](const std::string& s) { return s.starts_with("empty cells: "); });
   baked.skipped.insert(baked.skipped.begin(), "tables: " + reason);
 }

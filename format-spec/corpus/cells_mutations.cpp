@@ -23,6 +23,10 @@ void break_cells(Collector& c) {
         [](Image& i) { i.header.origin_y = 0x7FF0000000000000u; });
   cells(c, RuleId::kQualityRange, "balanced heeds 9 classes of loss",
         [](Image& i) { i.header.quality[LSP_QUALITY_BALANCED] = LSP_DIAL(9u, 0u); });
+  Image tables = full_cells_scene(false);
+  tables.header.quality[LSP_QUALITY_ACCURATE] = LSP_DIAL(8u, 3u);
+  c.add(RuleId::kQualityRange, "accurate traces cells of a file without EXACT exactly", encode(tables), {},
+        "-tables");
   cells(c, RuleId::kCellNumber, "the filled cell names record 1", [](Image& i) { i.cell_words[0] |= 1; });
   cells(c, RuleId::kCellJump, "the empty cell jumps over its neighbour, which is filled",
         [](Image& i) { i.cell_words[1] = 1; });

@@ -42,6 +42,11 @@ void alone(Collector& c) {
                [](LspHeader& h) { h.required_features &= ~(LSP_FEATURE_WIDE | LSP_FEATURE_EXACT); });
   alone_header(c, RuleId::kCellsGrid, "a grid is stated of wide nodes alone",
                [](LspHeader& h) { h.cells = full_wide_scene().header.cells; });
+  Bytes counted = encode(wide_alone_scene());
+  header_of(counted).plane_count = 7;
+  repair_hashes(counted);
+  c.add(RuleId::kCellsGrid, "wide nodes alone count seven planes of cells", std::move(counted), {},
+        "-wide-alone-counts");
   alone_header(c, RuleId::kQualityRange, "the quality balanced of wide nodes alone heeds a class of loss",
                [](LspHeader& h) { h.quality[0] = 1; });
   Image with_grid = wide_alone_scene();
@@ -65,8 +70,10 @@ void header_and_table(Collector& c) {
               [](LspHeader& h) { h.wide_node_count = (1u << 30) + 1; });
   wide_header(c, RuleId::kStepsBound, "max_steps of four wide nodes is 53",
               [](LspHeader& h) { h.max_steps = 53; });
-  wide_header(c, RuleId::kWideNodes, "WIDE is set, EXACT is clear",
-              [](LspHeader& h) { h.required_features &= ~LSP_FEATURE_EXACT; });
+  wide_header(c, RuleId::kWideNodes, "WIDE is set, EXACT is clear", [](LspHeader& h) {
+    h.required_features &= ~LSP_FEATURE_EXACT;
+    for (uint32_t& dial : h.quality) dial = LSP_DIAL_TABLES;
+  });
   wide_header(c, RuleId::kCountDiffers, "wide_node_count is one more",
               [](LspHeader& h) { h.wide_node_count += 1; });
   {

@@ -139,6 +139,11 @@ void check_grid(const LspHeader& header, Report& report) {
            near(255.0 * g.box_step, g.size + 2.0 * g.margin);
   if (!good)
     LSP_HEADER_FINDING(kCellsGrid, cells, "the grid of cells is out of range, or there where there is none");
+  const uint32_t counts = header.filled_cell_count | header.entry_word_count | header.plane_count |
+                          header.split_count | header.cell_node_count | header.cell_reference_count;
+  if (counts != 0 && !has_cells(header))
+    LSP_HEADER_FINDING(kCellsGrid, filled_cell_count,
+                       "or another count of cells is not zero, but there are none");
   const double origin[] = {std::bit_cast<double>(header.origin_x), std::bit_cast<double>(header.origin_y),
                            std::bit_cast<double>(header.origin_z)};
   for (double x : origin)
@@ -148,7 +153,9 @@ void check_grid(const LspHeader& header, Report& report) {
     }
   for (uint32_t dial : header.quality)
     if ((dial & 0xFF) > LSP_LOSS_UNKNOWN + 1 || dial >> 8 > LSP_LOSS_UNKNOWN + 1 ||
-        (dial != 0 && !has_cells(header))) {
+        (dial != 0 && !has_cells(header)) ||
+        (dial != LSP_DIAL_TABLES && has_cells(header) &&
+         (header.required_features & LSP_FEATURE_EXACT) == 0)) {
       LSP_HEADER_FINDING(kQualityRange, quality, "is " + hex(dial));
       break;
     }

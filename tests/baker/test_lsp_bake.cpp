@@ -7,6 +7,7 @@
 #include <cmath>
 #include <csignal>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -15,6 +16,7 @@
 #include <thread>
 
 #include "grid_mesh.h"
+#include "lsp/layout.h"
 #include "shell.h"
 
 namespace lsp::test {
@@ -116,6 +118,14 @@ TEST_F(LspBake, SmallThingsStaySmall) {
               "asks for them)");
     EXPECT_LT(bytes.file, 4096u) << "mostly padding";
     EXPECT_TRUE(report["error"].is_null()) << "every ray is exact";
+    const std::string file = read("a.lsp");
+    LspHeader header;
+    ASSERT_GE(file.size(), sizeof header);
+    std::memcpy(&header, file.data(), sizeof header);
+    EXPECT_EQ(header.filled_cell_count | header.entry_word_count | header.plane_count | header.split_count |
+                  header.cell_node_count | header.cell_reference_count,
+              0u)
+        << "counts of sections that were left out";
   }
   // Here a cell's loss is everywhere, and rays leave soon.
   ASSERT_EQ(run("grid.obj -o b.lsp --preset fast --json"), 0) << read("err");
