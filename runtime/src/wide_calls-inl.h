@@ -113,7 +113,7 @@ class Calls {
     store(tree[0], ref_ + i);
     store(tree[1], node_first_ + i);
     store(tree[2], reference_first_ + i);
-    store(tree[3], max_steps_ + i);
+    store(hn::Min(tree[3], set_u(LSP_CELL_LEAF_BIT)), max_steps_ + i);
     store(set_u(1), top_ + i);
     store(hn::Zero(du), step_ + i);
     store(set_u(LSP_NONE), triangle_ + i);

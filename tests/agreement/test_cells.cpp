@@ -402,6 +402,22 @@ TEST(Cells, SameTablesWithAnyNumberOfThreads) {
 }
 
 // A tree of a cell names 8,191 triangles: with more the bake takes finer cells or says so.
+// A damaged tree whose nodes name each other, and whose record allows any number of steps.
+TEST(Cells, CallsEndInTreesWithoutEnd) {
+  lsp::Baked baked = bake(sphere(12), options_of_cells());
+  for (LspCellNode& n : baked.cell_tables.nodes) n = {0xFF000000u, 0x0000FFFFu, 0xFFFFFF00u, 0};
+  for (LspFilledCell& c : baked.cell_tables.cells) {
+    c.max_steps = UINT32_MAX;
+    if (c.root < LSP_CELL_LEAF_BIT) c.root = 0;
+  }
+  const std::vector<LspRay> rays = surface_rays(baked, 64, 1);
+  lsp_trace_counts counts{};
+  trace(view(baked), tables_but(0), rays, &counts);  // one by one
+  EXPECT_GT(counts.exact_nodes, uint64_t{LSP_CELL_LEAF_BIT});
+  EXPECT_LE(counts.exact_nodes, uint64_t{LSP_CELL_LEAF_BIT} * counts.exact);
+  trace(view(baked), tables_but(0), rays);  // in lanes
+}
+
 TEST(Cells, ACrowdedCellIsDividedOrRefused) {
   Mesh mesh = sphere(72);  // 20,448 triangles
   add_triangle(mesh, {200, 0, 0}, {200, 1, 0}, {200, 0, 1});

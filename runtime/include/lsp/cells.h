@@ -434,6 +434,8 @@ LSP_STEP void lsp_test_leaf(LspScene scene, LspSetup s) {
   if ((LSP_PARTS & LSP_PART_CELL_EXACT) == 0u) return;
   LspCellGrid grid = lsp_load_header(scene).cells;
   LspFilledCell tree = lsp_load_cell_tree(scene, lsp_walk.ref & ~LSP_LEAF_BIT);
+  /* Of a damaged file that may be any number; of a valid one no more than children can name. */
+  uint most = tree.max_steps < LSP_CELL_LEAF_BIT ? tree.max_steps : LSP_CELL_LEAF_BIT;
   precise float reach = grid.margin / s.speed; /* along no axis more than the margin */
   s.tmin = lsp_max(s.tmin, lsp_walk.exact_t - reach);
   s.tmax = lsp_min(s.tmax, lsp_walk.t + reach);
@@ -447,7 +449,7 @@ LSP_STEP void lsp_test_leaf(LspScene scene, LspSetup s) {
   uint step = 0u;
   lsp_walk.counts.exact += 1u;
   while (ref != LSP_CELL_NO_CHILD) {
-    while (ref < LSP_CELL_LEAF_BIT && step < tree.max_steps) {
+    while (ref < LSP_CELL_LEAF_BIT && step < most) {
       ++step;
       LspCellNode n = lsp_load_cell_node(scene, tree.node_first + ref);
       float t0 = lsp_cell_box(vec3(lsp_byte(n.box_0, 0u), lsp_byte(n.box_0, 8u), lsp_byte(n.box_0, 16u)),
