@@ -410,7 +410,7 @@ TEST(Cells, CallsEndInTreesWithoutEnd) {
     c.max_steps = UINT32_MAX;
     if (c.root < LSP_CELL_LEAF_BIT) c.root = 0;
   }
-  const std::vector<LspRay> rays = surface_rays(baked, 64, 1);
+  const std::vector<LspRay> rays = surface_rays(baked, 20, 1);
   lsp_trace_counts counts{};
   trace(view(baked), tables_but(0), rays, &counts);  // one by one
   EXPECT_GT(counts.exact_nodes, uint64_t{LSP_CELL_LEAF_BIT});
