@@ -162,7 +162,7 @@ struct Tracer : Rays<kPool> {
     begin(i, first, last, tables ? valid : hn::And(valid, hn::Lt(largest(load_3(origin_, i)), reach)));
   }
 
-  // lsp_enter: where rays begin, or enter the grid.
+  // The beginning of lsp_begin: where rays begin, or enter the grid.
   struct Entered {
     VF t, t_last;
     VI axis, cell[3];
@@ -205,7 +205,9 @@ struct Tracer : Rays<kPool> {
     return hn::ConvertTo(di, min_of(max_of(hn::Zero(df), p), set(static_cast<float>(cells) - 0.5f)));
   }
 
-  // lsp_begins_again, of rays that are to.
+  // Of rays that have come to their end and are to go on, see lsp_advance. Those of which cells wait pass
+  // through all cells again, where a single ray goes back to the first that waits: on the way there none is
+  // asked.
   HWY_NOINLINE void begin_again(size_t i, Bits lanes) {
     const MF these = mask_of(lanes);
     const Entered at = enter(i, load(tmin_ + i), load(tmax_ + i));
@@ -214,24 +216,25 @@ struct Tracer : Rays<kPool> {
     store(select(these, at.t, load(t_out + i)), t_out + i);
     store(select(as_int(these), hn::Max(at.axis, hn::Zero(di)), load(axis_out + i)), axis_out + i);
     const VU mode = load(mode_ + i);
-    const MU waits = hn::Eq(hn::And(mode, set_u(kModes)), set_u(LSP_WALK_WAITS));
-    const MU some = hn::And(waits, hn::Ne(load(waiting_ + i), hn::Zero(du)));
+    const MU some = hn::And(in_mode(i, LSP_WALK_WAITS), hn::Ne(load(waiting_ + i), hn::Zero(du)));
     const VU after =
         select(some, hn::Or(hn::And(mode, set_u(kClosed)), set_u(LSP_WALK_MAKES_UP)), set_u(LSP_WALK_AGAIN));
     store(select(as_uint(these), after, mode), mode_ + i);
     store(select(as_uint(these), set_u(LSP_NONE), load(step_ + i)), step_ + i);  // compact adds one
   }
 
+  // Lanes whose LspWalk.mode is this.
+  HWY_INLINE MU in_mode(size_t i, uint32_t mode) const {
+    return hn::Eq(hn::And(load(mode_ + i), set_u(kModes)), set_u(mode));
+  }
   // Rays that began again for the cells that waited, all of which are made up for.
   HWY_INLINE MF has_made_up(size_t i) const {
-    const MU makes_up = hn::Eq(hn::And(load(mode_ + i), set_u(kModes)), set_u(LSP_WALK_MAKES_UP));
-    return as_float(hn::And(makes_up, hn::Eq(load(waiting_ + i), hn::Zero(du))));
+    return as_float(hn::And(in_mode(i, LSP_WALK_MAKES_UP), hn::Eq(load(waiting_ + i), hn::Zero(du))));
   }
   // Rays that begin again if they come to their end.
   HWY_INLINE MF may_begin_again(size_t i) const {
     const VU mode = load(mode_ + i);
-    const MU waits = hn::And(hn::Eq(hn::And(mode, set_u(kModes)), set_u(LSP_WALK_WAITS)),
-                             hn::Ne(load(waiting_ + i), hn::Zero(du)));
+    const MU waits = hn::And(in_mode(i, LSP_WALK_WAITS), hn::Ne(load(waiting_ + i), hn::Zero(du)));
     return as_float(hn::Or(waits, hn::Ne(hn::And(mode, set_u(kClosed)), hn::Zero(du))));
   }
   // lsp_step_bit.
@@ -241,8 +244,8 @@ struct Tracer : Rays<kPool> {
   // Of rays at filled cells those that look into them: where they make up for what waited the others have
   // answered, and that is traced exactly.
   HWY_INLINE MF make_up(size_t i, MF going, MF is_filled, VU word) {
-    const MU makes_up = hn::And(hn::Eq(hn::And(load(mode_ + i), set_u(kModes)), set_u(LSP_WALK_MAKES_UP)),
-                                hn::Lt(load(step_ + i), set_u(LSP_LAST_WAITING)));
+    const MU makes_up =
+        hn::And(in_mode(i, LSP_WALK_MAKES_UP), hn::Lt(load(step_ + i), set_u(LSP_LAST_WAITING)));
     const MU known = hn::And(makes_up, as_uint(going));
     if (bits_of(as_float(known)) == 0) return is_filled;
     const VU bit = step_bit(i), waiting = load(waiting_ + i);
@@ -508,7 +511,7 @@ struct Tracer : Rays<kPool> {
     return bits_of(hn::AndNot(waits, exactly));
   }
   HWY_INLINE MF may_wait(size_t i) const {
-    const MU waits = hn::Eq(hn::And(load(mode_ + i), set_u(kModes)), set_u(LSP_WALK_WAITS));
+    const MU waits = in_mode(i, LSP_WALK_WAITS);
     const MU some =
         hn::Or(hn::Ne(load(waiting_ + i), hn::Zero(du)), hn::Lt(load(step_ + i), set_u(LSP_LAST_WAITING)));
     return as_float(hn::And(waits, some));
