@@ -7,7 +7,7 @@
  * is empty, a plane, or a split: two answers, and a linear form over the ray's place in the shaft whose sign chooses.
  * An entry that loses more than asked for is not heeded: the ray is traced exactly through this cell, in the cell's
  * own small tree, and goes on from there. Where any hit will do such cells wait: what a table is sure of, however far,
- * ends the ray without them, and only where none is the ray begins again for them. A ray that misses everything, but
+ * ends the ray without them, and only where none is the ray goes back to them. A ray that misses everything, but
  * leaves the cell it begins in by a way on which the bake found no sky (LspFilledCell.closed), begins again, and every
  * cell is traced exactly.
  *
@@ -360,7 +360,10 @@ LSP_STEP void lsp_begin(LspScene scene, LspSetup s, LspQuery q) {
   lsp_walk.axis = pass.axis_out;
 }
 
-/* From cell to cell until a table answers, or a cell is to be traced exactly, or the ray is over. */
+/* From cell to cell until a table answers, or a cell is to be traced exactly, or the ray is over.
+ *
+ * Where the ray entered the grid is not worked out here again: glslang's search for what `precise` concerns has no end
+ * then (trace_passes.comp with addresses: minutes and 12 GB for half a second). Time it after a change to this. */
 LSP_STEP void lsp_advance(LspScene scene, LspSetup s, LspQuery q) {
   LspCellGrid grid = lsp_load_header(scene).cells;
   LspCellRay r = lsp_cell_ray(grid, s);
