@@ -70,6 +70,8 @@ struct Tracer : Rays<kPool> {
   Lanes<int32_t> next_cell[3]{}, axis_out{};
   Lanes<uint32_t> index{}, entry{}, plane_first{}, plane_count{}, plane{};
   Lanes<float> t_out{}, place[5]{};
+  // What an entry loses in classes, the ray's place in addition, and what is asked for: lsp_is_lossy.
+  Lanes<float> loss{}, risk{}, heeded{};
   // Rays that look into a filled cell, of which some do not know what they lose there; that are done; that
   // are to be traced exactly; whose answer is a split; that have a plane to meet; whose plane is there in
   // part, so that they are to be traced exactly as well.
@@ -476,16 +478,26 @@ struct Tracer : Rays<kPool> {
     const MF begins = as_float(hn::Lt(load(axis_ + i), hn::Zero(di)));
     said =
         select(as_uint(mask_of(unknown >> i)), hn::Or(said, set_u(LSP_LOSS_UNKNOWN << LSP_LOSS_SHIFT)), said);
-    const VU limit = hn::IfThenZeroElse(hn::Eq(load(mode_ + i), set_u(LSP_WALK_AGAIN)),
-                                        select(as_uint(begins), set_u(dial & 0xFFu), set_u(dial >> 8u)));
-    const MF exactly = hn::AndNot(as_float(hn::Lt(hn::ShiftRight<LSP_LOSS_SHIFT>(said), limit)), looks);
+    const VU number = hn::ShiftRight<LSP_LOSS_SHIFT>(said);
+    const VF classes = select(as_float(hn::Eq(number, set_u(LSP_LOSS_UNKNOWN))), set(LSP_RISK_UNKNOWN),
+                              hn::ConvertTo(df, hn::BitCast(di, number)));
+    const VF all = set(-INFINITY);
+    const VF limit = select(as_float(hn::Eq(load(mode_ + i), set_u(LSP_WALK_AGAIN))), all,
+                            select(begins, set(heeded_of(dial & 0xFFu)), set(heeded_of(dial >> 8u))));
+    store(classes, loss + i);
+    store(limit, heeded + i);
+    store(hn::Zero(df), risk + i);
     const VU answer = hn::And(said, set_u(LSP_ANSWER_MASK));
-    const MF answers = hn::AndNot(exactly, hn::And(looks, as_float(hn::Lt(answer, set_u(LSP_ANSWER_LIMIT)))));
+    const MF has_answer = as_float(hn::Lt(answer, set_u(LSP_ANSWER_LIMIT)));
+    const VF empty = select(begins, set(LSP_RISK_NO_SPLIT(true)), set(LSP_RISK_NO_SPLIT(false)));
+    const MF exactly = hn::And(
+        looks, hn::Or(hn::Eq(limit, all), hn::AndNot(has_answer, hn::Ge(hn::Add(classes, empty), limit))));
+    const MF answers = hn::AndNot(exactly, hn::And(looks, has_answer));
     const MU is_sky = hn::And(hn::Eq(answer, set_u(LSP_ANSWER_SKY)), hn::Lt(load(mode_ + i), set_u(kClosed)));
     const Bits sky = bits_of(hn::AndNot(exactly, hn::And(looks, as_float(is_sky))));
     LSP_FOR_BITS(k, sky) end(ray_[i + k], 0);
     over |= sky << i;
-    exact |= (any_hit ? wait(i, exactly) : bits_of(exactly)) << i;
+    trace_exactly(i, exactly);
     const Bits answer_bits = bits_of(answers);
     if (answer_bits == 0) return;
 
@@ -503,6 +515,16 @@ struct Tracer : Rays<kPool> {
     LSP_FOR_BITS(k, answer_bits & ~direct_bits) fetch(scene.splits, plane[i + k]);
   }
 
+  // From which class on a cell is traced exactly: lsp_is_lossy.
+  static float heeded_of(uint32_t classes) {
+    return classes == 0 ? -INFINITY : classes > LSP_LOSS_UNKNOWN ? INFINITY : static_cast<float>(classes);
+  }
+  HWY_INLINE MF is_lossy(size_t i, VF more) const {
+    return hn::Ge(hn::Add(load(loss + i), more), load(heeded + i));
+  }
+  HWY_INLINE void trace_exactly(size_t i, MF these) {
+    exact |= (any_hit ? wait(i, these) : bits_of(these)) << i;
+  }
   // Of rays that are to be traced exactly those that do not wait until no table has a hit.
   HWY_INLINE Bits wait(size_t i, MF exactly) {
     const MF waits = hn::And(exactly, may_wait(i));
@@ -528,6 +550,17 @@ struct Tracer : Rays<kPool> {
     return hn::ConvertTo(df, hn::ShiftRight<26>(hn::BitCast(di, hn::ShiftLeft<kFromTop>(bits))));
   }
 
+  // lsp_split_risk.
+  static HWY_INLINE VF split_risk(VF side, MF has_plane, MF begins) {
+    const auto choose = [&](float plane_far, float plane_origin, float far, float origin) HWY_ATTR {
+      return select(has_plane, select(begins, set(plane_origin), set(plane_far)),
+                    select(begins, set(origin), set(far)));
+    };
+    const VF least = choose(-2, 0, -5, -3), most = choose(2, 2, 7, 4);
+    const VF per_form = choose(0.125f, 0.0625f, 0.5f, 0.125f);
+    return max_of(least, hn::Sub(most, hn::Mul(per_form, hn::Abs(side))));
+  }
+
   // The side of the splits: lsp_split_side, lsp_cell_plane.
   HWY_INLINE void choose(size_t i) {
     const MU asked = as_uint(mask_of(split >> i));
@@ -544,9 +577,13 @@ struct Tracer : Rays<kPool> {
     sum = hn::Add(sum, hn::Mul(weight<2>(weights), load(place[4] + i)));
     const MU first = as_uint(hn::Gt(sum, hn::Zero(df)));
     const VU side = hn::And(select(first, answers, hn::ShiftRight<12>(answers)), set_u(LSP_SPLIT_MASK));
-    const Bits is_plane = bits_of(as_float(hn::And(asked, hn::Lt(side, load(plane_count + i)))));
+    const MU has_plane = hn::And(asked, hn::Lt(side, load(plane_count + i)));
+    const Bits is_plane = bits_of(as_float(has_plane));
     store(select(asked, hn::Add(load(plane_first + i), side), number), plane + i);
     meets |= is_plane << i;
+    const VF more = split_risk(sum, as_float(has_plane), as_float(hn::Lt(load(axis_ + i), hn::Zero(di))));
+    store(hn::IfThenElseZero(as_float(asked), more), risk + i);
+    trace_exactly(i, hn::And(as_float(hn::AndNot(has_plane, asked)), is_lossy(i, more)));
     LSP_FOR_BITS(k, is_plane) fetch_plane(plane[i + k]);
   }
 
@@ -567,9 +604,19 @@ struct Tracer : Rays<kPool> {
         hn::Div(hn::Sub(hn::BitCast(df, record[3]), dot(normal, origin)), dot(normal, load_3(direction_, i)));
     const VF slack = hn::Mul(set(LSP_CELL_SLACK), hn::Sub(t_to, t_in));
     const MF begins = as_float(hn::Lt(load(axis_ + i), hn::Zero(di)));
-    const MF met = hn::And(
-        hn::And(asked, hn::Gt(t, tmin)),
-        hn::And(hn::Gt(t, select(begins, t_in, hn::Sub(t_in, slack))), hn::Le(t, hn::Add(t_to, slack))));
+    const MF ahead = hn::And(hn::Gt(t, tmin), hn::Gt(t, select(begins, t_in, hn::Sub(t_in, slack))));
+    const MF meets_it = hn::And(ahead, hn::Le(t, hn::Add(t_to, slack)));
+    const MF within = hn::Le(t, t_to);
+    const MF at_once = hn::Lt(t, hn::Add(t_in, hn::Mul(set(2), slack)));
+    const VF beyond = set(8);
+    const VF of_origin = select(
+        ahead, select(at_once, set(6), select(within, set(2), select(meets_it, beyond, set(1)))), set(-1));
+    const VF of_far =
+        hn::IfThenElseZero(meets_it, select(hn::Lt(t, t_in), set(4), hn::IfThenZeroElse(within, beyond)));
+    const MF exactly =
+        hn::And(asked, is_lossy(i, hn::Add(load(risk + i), select(begins, of_origin, of_far))));
+    trace_exactly(i, exactly);
+    const MF met = hn::AndNot(exactly, hn::And(asked, meets_it));
     VF hit = select(hn::Lt(t, t_in), t_in, t);
     hit = select(hn::Gt(hit, t_to), t_to, hit);
     const Bits hit_bits = bits_of(hn::And(met, hn::And(hn::Gt(hit, tmin), hn::Lt(hit, load(tmax_ + i)))));

@@ -37,7 +37,7 @@ typedef struct lsp_float3 {
 
 /* Version of the format (not of the programs). A reader refuses another major version. */
 #define LSP_VERSION_MAJOR 2u
-#define LSP_VERSION_MINOR 5u
+#define LSP_VERSION_MINOR 6u
 
 /* First eight bytes: 89 'L' 'S' 'P' 0D 0A 1A 0A, as two little-endian words. Catches text-mode transfers. */
 #define LSP_MAGIC_0 0x50534C89u
@@ -191,7 +191,7 @@ LSP_BEGIN(LspHeader)
   LSP_UINT split_count;
   LSP_UINT cell_node_count;      /* LspCellNode */
   LSP_UINT cell_reference_count; /* of CREF */
-  LSP_UINT quality[3]; /* LSP_QUALITY_*: LSP_DIAL of how many classes of loss are heeded */
+  LSP_UINT quality[3]; /* LSP_QUALITY_*: LSP_DIAL of how many classes are heeded of what answers lose */
   LSP_UINT wide_node_count; /* LspWideNode */
 LSP_END(LspHeader)
 

@@ -205,10 +205,19 @@ class Cells:
             places = place_in + place_out
         entry = int(self.entries[index])
         loss, answer = entry >> 13 if loss is None else loss, entry & 0x1FFF
-        if again or loss >= self.heeded[0 if begins else 1]:
+        heeded = self.heeded[0 if begins else 1]
+
+        def lossy(place):
+            return again or heeded == 0 or heeded < 8 and (loss == 7 or loss + place >= heeded)
+
+        def exactly():
             hit = trace_tree(f, cell, corner, ray, t_in, t_out)
             return hit, hit is not None, closed
+
+        risk = 0
         if answer >= 0x1FFE:
+            if lossy(-2 if begins else 1):
+                return exactly()
             return None, answer == 0x1FFE and not closed, closed
         if answer >= cell["plane_count"]:
             split = f["CSPL"][int(cell["split_first"]) + answer - int(cell["plane_count"])]
@@ -216,21 +225,30 @@ class Cells:
             form = sum(weight(split["weights"], 6 * i) * x for i, x in enumerate(places))
             form += weight(split["answers"], 24)
             answer = int(split["answers"]) >> (0 if form > 0 else 12) & 0xFFF
+            form = abs(form)
             if answer == 0xFFF:
-                return None, False, closed
+                risk = max(-3, 4 - form / 8) if begins else max(-5, 7 - form / 2)
+                return exactly() if lossy(risk) else (None, False, closed)
+            risk = max(0, 2 - form / 16) if begins else max(-2, 2 - form / 8)
         plane = int(cell["plane_first"]) + answer
         normal, record = f["CPLN"][plane]["normal"].astype(float), int(f["CPRC"][plane])
         with np.errstate(all="ignore"):
             t = f["CPLN"][plane]["distance"] * self.size - normal @ (ray.o - corner - self.size / 2)
             t /= normal @ ray.d
         slack = (t_out - t_in) / 20
+        if begins:
+            ahead = t > max(ray.tmin, t_in)
+            risk += -1 if not ahead else 6 if t < t_in + 2 * slack else 2 if t <= t_out else 8 if t <= t_out + slack else 1
+        elif max(ray.tmin, t_in - slack) < t <= t_out + slack:
+            risk += 4 if t < t_in else 0 if t <= t_out else 8
+        if lossy(risk):
+            return exactly()
         if not max(ray.tmin, t_in if begins else t_in - slack) < t <= t_out + slack:
             return None, False, closed
         t = min(max(t, t_in), t_out)
         if not ray.tmin < t < ray.tmax:
             return None, False, closed
         if f.gaps[record] and not self.tables_alone:
-            hit = trace_tree(f, cell, corner, ray, t_in, t_out)
-            return hit, hit is not None, closed
+            return exactly()
         over = not f.gaps[record] or not passes(f, record, ray)
         return Hit(t, f.primitive[record]) if over else None, over, closed
