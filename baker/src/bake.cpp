@@ -1,6 +1,7 @@
 #include "bake.h"
 
 #include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -43,7 +44,7 @@ uint32_t gaps_of(float coverage) {
 void fill_triangles(const Mesh& mesh, const Bvh& bvh, bool normals, bool materials, Baked& baked) {
   baked.triangles.resize(bvh.records.size());
   if (normals) baked.normals.resize(bvh.records.size());
-  for (size_t i = 0; i < bvh.records.size(); ++i) {
+  tbb::parallel_for(size_t(0), bvh.records.size(), [&](size_t i) {
     const uint32_t t = bvh.records[i];
     const glm::uvec3 corners = mesh.triangles[t];
     uint32_t flags = gaps_of(mesh.materials[mesh.material_ids[t]].opacity) << LSP_TRIANGLE_GAPS_SHIFT;
@@ -56,7 +57,7 @@ void fill_triangles(const Mesh& mesh, const Bvh& bvh, bool normals, bool materia
     baked.triangles[i] = {f3(mesh.positions[corners.x]), mesh.primitives[t],
                           f3(mesh.positions[corners.y]), materials ? mesh.material_ids[t] : 0,
                           f3(mesh.positions[corners.z]), flags};
-  }
+  });
 }
 
 // What the header states of the BVH.

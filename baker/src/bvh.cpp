@@ -372,9 +372,11 @@ class Builder {
         left_box.hi = Int4{0, 1, 2, 3} == axis ? greater(left_box.hi, Float4{} + plane) : left_box.hi;
         right_box.lo = Int4{0, 1, 2, 3} == axis ? lesser(right_box.lo, Float4{} + plane) : right_box.lo;
       }
-      least = std::min(least, split_cost(left, left_box, count - exited, right_box));
+      if (left == 0 || exited == count) return;
+      least = std::min(least, double(left) * double(left_box.rough_half_area()) +
+                                  double(count - exited) * double(right_box.rough_half_area()));
     });
-    return least;
+    return options_.triangle_cost * least;
   }
 
   // The best split that costs less than `limit`; where there is none, one that costs as much or infinitely

@@ -1,5 +1,7 @@
 #include "wide_tree.h"
 
+#include <tbb/parallel_invoke.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -35,8 +37,7 @@ class Collapse {
 
   WideTree run() {
     if (bvh_.root == LSP_NONE) return {};
-    // Children come after their parents: from the last node on, what is below is known.
-    for (size_t i = bvh_.nodes.size(); i-- > 0;) plan(static_cast<uint32_t>(i));
+    plan_all(0, static_cast<uint32_t>(bvh_.nodes.size()));
     order_.reserve(bvh_.records.size());
     std::vector<Branch> root;
     if (is_leaf_reference(bvh_.root))
@@ -82,6 +83,20 @@ class Collapse {
   double cost_of(const Branch& b, size_t k) const {
     return is_leaf_reference(b.ref()) ? leaf_cost(b.box.half_area(), count_of(b.ref()))
                                       : plans_[b.ref()].cost[k - 1];
+  }
+
+  // Plans a subtree, the nodes from `first` to `end`: in depth-first order, child 0 before child 1.
+  void plan_all(uint32_t first, uint32_t end) {
+    constexpr uint32_t kTaskNodes = 4096;  // smaller subtrees are planned by one task
+    if (end - first > kTaskNodes) {
+      const LspNode& n = bvh_.nodes[first];
+      const bool both = !is_leaf_reference(n.child0) && !is_leaf_reference(n.child1);
+      const uint32_t second = both ? n.child1 : end;
+      tbb::parallel_invoke([&] { plan_all(first + 1, second); }, [&] { plan_all(second, end); });
+      return plan(first);
+    }
+    // Children come after their parents: from the last node on, what is below is known.
+    for (uint32_t i = end; i-- > first;) plan(i);
   }
 
   // Dynamic programming over the ways to cut a subtree (Ylitie, section 3.2).

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <limits>
 
+#include "../box4.h"
 #include "../clones.h"
 #include "lsp/layout.h"
 
@@ -99,11 +100,6 @@ LSP_CLONES void add_unlike(const float* by_kind, const uint32_t* kinds, size_t c
   for (size_t i = 0; i < count; ++i) losses[i] = lesser(1.0f, losses[i] + by_kind[kinds[i]]);
 }
 
-// What each sample loses where the better of two answers is given.
-LSP_CLONES void lesser_losses(const float* first, const float* second, size_t count, float* losses) {
-  for (size_t i = 0; i < count; ++i) losses[i] = lesser(first[i], second[i]);
-}
-
 // What each sample loses where a linear form of its place chooses between two answers.
 LSP_CLONES void split_losses(const ShaftSamples& s, const std::array<float, kTerms>& w, const float* first,
                              const float* second, float* losses) {
@@ -153,44 +149,54 @@ LSP_CLONES void weigh(const Form& w, SplitSamples& s) {
   }
 }
 
-struct alignas(kLanes * sizeof(double)) Lane {
-  double v[kLanes];
-};
-[[gnu::always_inline]] inline Lane lane_at(const std::vector<double>& numbers, size_t first) {
-  Lane lane;
-  std::memcpy(lane.v, &numbers[first], sizeof lane.v);
-  return lane;
+using Lane = double __attribute__((vector_size(kLanes * sizeof(double))));
+[[gnu::always_inline]] inline void load(const std::vector<double>& numbers, size_t first, Lane& lane) {
+  std::memcpy(&lane, &numbers[first], sizeof lane);
+}
+[[gnu::always_inline]] inline double sum(const Lane& lane) {
+  double four[4], two[2];
+  for (size_t i = 0; i < 4; ++i) four[i] = lane[i] + lane[i + 4];
+  for (size_t i = 0; i < 2; ++i) two[i] = four[i] + four[i + 2];
+  return two[0] + two[1];
 }
 
 // The normal equations. Sums are of kLanes lanes whatever the machine's vectors hold, so that they are the
-// same everywhere.
+// same everywhere. Unrolled, they stay in registers. The last term is 1, and the last place is 0 in a far
+// table: no sum is taken where it is known.
 LSP_CLONES void normal_equations(const SplitSamples& s, const std::vector<double>& weights, Equations& e) {
+  constexpr size_t kOne = kTerms - 1, kFifth = kTerms - 2;
   Lane sums[kTerms][kTerms] = {}, right[kTerms] = {};
   const size_t count = s.weight.size();
+  const bool fifth = s.has_fifth;
   for (size_t first = 0; first < count; first += kLanes) {
-    // Copies, of which the compiler knows that they are apart.
-    Lane terms[kTerms], weight, sign;
-    for (size_t k = 0; k < kTerms; ++k) terms[k] = lane_at(s.terms[k], first);
-    weight = lane_at(weights, first);
-    sign = lane_at(s.sign, first);
-    for (size_t a = 0; a < kTerms; ++a) {
-      Lane scaled;
-      for (size_t i = 0; i < kLanes; ++i) scaled.v[i] = weight.v[i] * terms[a].v[i];
-      for (size_t b = 0; b <= a; ++b)
-        for (size_t i = 0; i < kLanes; ++i) sums[a][b].v[i] += scaled.v[i] * terms[b].v[i];
-      for (size_t i = 0; i < kLanes; ++i) right[a].v[i] += scaled.v[i] * sign.v[i];
+    Lane terms[kOne], weight, sign;
+    load(weights, first, weight);
+    load(s.sign, first, sign);
+#pragma GCC unroll 8
+    for (size_t a = 0; a < kOne; ++a) {
+      if (a == kFifth && !fifth) continue;
+      load(s.terms[a], first, terms[a]);
+      const Lane scaled = weight * terms[a];
+#pragma GCC unroll 8
+      for (size_t b = 0; b <= a; ++b) sums[a][b] += scaled * terms[b];
+      sums[kOne][a] += scaled;
+      right[a] += scaled * sign;
     }
+    sums[kOne][kOne] += weight;
+    right[kOne] += weight * sign;
   }
-  const auto sum = [](const Lane& lane) {
-    double four[4], two[2];
-    for (size_t i = 0; i < 4; ++i) four[i] = lane.v[i] + lane.v[i + 4];
-    for (size_t i = 0; i < 2; ++i) two[i] = four[i] + four[i + 2];
-    return two[0] + two[1];
-  };
+#pragma GCC unroll 8
   for (size_t a = 0; a < kTerms; ++a) {
+#pragma GCC unroll 8
     for (size_t b = 0; b <= a; ++b) e.m[a][b] = sum(sums[a][b]);
     e.right[a] = sum(right[a]);
   }
+}
+
+Float4 four_at(const float* numbers) {
+  Float4 four;
+  std::memcpy(&four, numbers, sizeof four);
+  return four;
 }
 
 }  // namespace
@@ -201,15 +207,28 @@ float unlike(const Plane& a, const Plane& b) {
   return std::min(1.0f, std::max({off.x, off.y, off.z}) + turned);
 }
 
-// In lanes of four, the last of which is of the samples that only measure.
-AnswerFit::Sums AnswerFit::sums(const float* losses) const {
-  float lanes[kHeldOut] = {};
+// Of what samples lose by `loss`, a function of the first of four. In lanes of four, the last of which is of
+// the samples that only measure; behind the last sample arrays hold kHeldOut - 1 more, which do not count.
+template <typename F>
+AnswerFit::Sums AnswerFit::sum_up(F&& loss) const {
+  Float4 lanes{};
   size_t i = 0;
-  for (; i + kHeldOut <= count_; i += kHeldOut)
-    for (size_t k = 0; k < kHeldOut; ++k) lanes[k] += losses[i + k];
-  for (; i < count_; ++i) lanes[i % kHeldOut] += losses[i];
+  for (; i + kHeldOut <= count_; i += kHeldOut) lanes += loss(i);
+  if (i < count_) {
+    const Int4 counts = Int4{0, 1, 2, 3} < int32_t(count_ - i);
+    lanes += counts ? loss(i) : Float4{};
+  }
   const float three = lanes[0] + lanes[1] + lanes[2];
   return held_out_ ? Sums{three, lanes[3]} : Sums{three + lanes[3], 0};
+}
+
+AnswerFit::Sums AnswerFit::sums(const float* losses) const {
+  return sum_up([&](size_t i) { return four_at(losses + i); });
+}
+
+// Where the better of two answers is given.
+AnswerFit::Sums AnswerFit::sums_of_better(const float* first, const float* second) const {
+  return sum_up([&](size_t i) { return lsp::lesser(four_at(first + i), four_at(second + i)); });
 }
 
 void AnswerFit::chosen(const std::array<int8_t, kTerms>& weights, const float* first, const float* second) {
@@ -220,6 +239,7 @@ void AnswerFit::chosen(const std::array<int8_t, kTerms>& weights, const float* f
 
 void AnswerFit::gather(const float* first, const float* second) {
   const size_t padded = (count_ + kLanes - 1) / kLanes * kLanes;
+  split_.has_fifth = samples_->place[kPlaces - 1] != nullptr;
   for (auto& terms : split_.terms) terms.assign(padded, 0);
   for (auto* numbers : {&split_.gain, &split_.sign, &split_.weight}) numbers->assign(padded, 0);
   find_gains(first, second, count_, held_out_, split_);
@@ -252,38 +272,46 @@ float AnswerFit::fit_split(const float* first, const float* second, Answer& answ
   return cost;
 }
 
-// Nothing, and the planes that the samples that choose meet.
+// Into met_ and kinds_: the planes that the samples meet; into candidates_: nothing, and those that the
+// samples that choose meet.
+void AnswerFit::sort_samples(size_t planes) {
+  met_.clear();
+  tried_.clear();
+  candidates_.assign(1, kNoPlane);
+  kinds_.resize(count_);
+  kind_of_.resize(planes + 1);  // kNoPlane last; of planes that were not met, anything
+  for (size_t i = 0; i < count_; ++i) {
+    const uint32_t plane = samples_->plane[i];
+    uint32_t& kind = kind_of_[std::min<size_t>(plane, planes)];
+    if (kind >= met_.size() || met_[kind] != plane) {
+      kind = uint32_t(met_.size());
+      met_.push_back(plane);
+      tried_.push_back(plane == kNoPlane);
+    }
+    kinds_[i] = kind;
+    if (tried_[kind] || (held_out_ && i % kHeldOut == kHeldOut - 1)) continue;
+    tried_[kind] = true;
+    if (candidates_.size() <= kCandidates) candidates_.push_back(plane);
+  }
+}
+
+void AnswerFit::lose_by_plane(const Plane& plane, bool near, float* losses) const {
+  plane_losses(*samples_, lengths_.data(), plane, near ? 0.0f : -LSP_CELL_SLACK, options_.depth_weight,
+               1 / size_, losses);
+}
+
+// What each sample loses by each candidate.
 void AnswerFit::add_candidates(std::span<const Plane> planes, bool near) {
   const ShaftSamples& s = *samples_;
-  candidates_.assign(1, kNoPlane);
-  for (size_t i = 0; i < count_ && candidates_.size() <= kCandidates; ++i)
-    if (!(held_out_ && i % kHeldOut == kHeldOut - 1) &&
-        std::find(candidates_.begin(), candidates_.end(), s.plane[i]) == candidates_.end())
-      candidates_.push_back(s.plane[i]);
-  losses_.resize(candidates_.size() * count_);
-  lengths_.resize(count_);
-  lengths_of(s, lengths_.data());
+  losses_.resize(candidates_.size() * count_ + kHeldOut);
   for (size_t i = 0; i < count_; ++i) losses_[i] = s.plane[i] != kNoPlane ? 1.0f : 0.0f;
   for (size_t c = 1; c < candidates_.size(); ++c)
-    plane_losses(s, lengths_.data(), planes[candidates_[c]], near ? 0.0f : -LSP_CELL_SLACK,
-                 options_.depth_weight, 1 / size_, &losses_[c * count_]);
+    lose_by_plane(planes[candidates_[c]], near, &losses_[c * count_]);
   if (options_.look_weight > 0) add_looks(planes);
 }
 
 // To a candidate's losses, where it is met in place of another plane.
 void AnswerFit::add_looks(std::span<const Plane> planes) {
-  met_.clear();
-  kinds_.resize(count_);
-  kind_of_.resize(planes.size() + 1);  // kNoPlane last; of planes that were not met, anything
-  for (size_t i = 0; i < count_; ++i) {
-    const uint32_t plane = samples_->plane[i];
-    uint32_t& kind = kind_of_[std::min<size_t>(plane, planes.size())];
-    if (kind >= met_.size() || met_[kind] != plane) {
-      kind = uint32_t(met_.size());
-      met_.push_back(plane);
-    }
-    kinds_[i] = kind;
-  }
   unlike_.resize(met_.size());
   for (size_t c = 1; c < candidates_.size(); ++c) {
     float most = 0;
@@ -298,6 +326,25 @@ void AnswerFit::add_looks(std::span<const Plane> planes) {
   }
 }
 
+float AnswerFit::loss_of(const Sums& sums) const {
+  const size_t held = held_out_ ? count_ / kHeldOut : 0, training = count_ - held;
+  const float loss = sums.training / float(training);
+  return held_out_ ? 0.5f * loss + 0.5f * sums.held / float(held) : loss;
+}
+
+// Where all samples meet one plane: that, unless none of them would meet it by its equation. Nothing is left
+// for a split to mend.
+bool AnswerFit::choose_only(std::span<const Plane> planes, bool near, Answer& answer) {
+  losses_.resize(count_ + kHeldOut);
+  lose_by_plane(planes[met_[0]], near, losses_.data());
+  const Sums lost = sums(losses_.data());
+  const size_t training = count_ - (held_out_ ? count_ / kHeldOut : 0);
+  if (!(lost.training < float(training))) return false;
+  answer.a = met_[0];
+  answer.loss = loss_of(lost);
+  return true;
+}
+
 Answer AnswerFit::choose(std::span<const Plane> planes, const ShaftSamples& samples, bool near) {
   Answer answer;
   samples_ = &samples;
@@ -305,10 +352,14 @@ Answer AnswerFit::choose(std::span<const Plane> planes, const ShaftSamples& samp
   if (std::all_of(samples.plane, samples.plane + count_, [](uint32_t p) { return p == kNoPlane; }))
     return answer;
   held_out_ = count_ >= 24;
-  chosen_.resize(count_);
+  sort_samples(planes.size());
+  lengths_.resize(count_);
+  lengths_of(samples, lengths_.data());
+  if (met_.size() == 1 && choose_only(planes, near, answer)) return answer;
+  chosen_.resize(count_ + kHeldOut);
   add_candidates(planes, near);
   const auto losses = [&](size_t candidate) { return &losses_[candidate * count_]; };
-  const size_t held = held_out_ ? count_ / kHeldOut : 0, training = count_ - held;
+  const size_t training = count_ - (held_out_ ? count_ / kHeldOut : 0);
   size_t best = 0;
   Sums best_sums{std::numeric_limits<float>::infinity(), 0};
   for (size_t c = 0; c < candidates_.size(); ++c)
@@ -321,8 +372,7 @@ Answer AnswerFit::choose(std::span<const Plane> planes, const ShaftSamples& samp
     size_t second = best;
     float second_sum = best_sums.training;
     for (size_t c = 0; c < candidates_.size(); ++c) {
-      lesser_losses(losses(best), losses(c), count_, chosen_.data());
-      if (const float sum = sums(chosen_.data()).training; sum < second_sum) {
+      if (const float sum = sums_of_better(losses(best), losses(c)).training; sum < second_sum) {
         second_sum = sum;
         second = c;
       }
@@ -335,8 +385,7 @@ Answer AnswerFit::choose(std::span<const Plane> planes, const ShaftSamples& samp
       best_sums = sums(chosen_.data());
     }
   }
-  answer.loss = best_sums.training / float(training);
-  if (held_out_) answer.loss = 0.5f * answer.loss + 0.5f * best_sums.held / float(held);
+  answer.loss = loss_of(best_sums);
   return answer;
 }
 

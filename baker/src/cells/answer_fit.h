@@ -59,6 +59,7 @@ constexpr int kSplitWeight = 31;
 // Samples in double, for a split between two answers, each an array by sample; padded.
 struct SplitSamples {
   std::array<std::vector<double>, kPlaces + 1> terms;  // places and 1
+  bool has_fifth = false;                              // place; else it is 0
   std::vector<double> gain;  // how much better the better answer is, 0: does not count
   std::vector<double> sign;  // 1: the first answer is the better one, -1: the second
   std::vector<double> weight;
@@ -77,7 +78,14 @@ class AnswerFit {
   struct Sums {
     float training = 0, held = 0;
   };
+  template <typename F>
+  Sums sum_up(F&& loss) const;
   Sums sums(const float* losses) const;
+  Sums sums_of_better(const float* first, const float* second) const;
+  float loss_of(const Sums& sums) const;
+  void sort_samples(size_t planes);
+  void lose_by_plane(const Plane& plane, bool near, float* losses) const;
+  bool choose_only(std::span<const Plane> planes, bool near, Answer& answer);
   void add_candidates(std::span<const Plane> planes, bool near);
   void add_looks(std::span<const Plane> planes);
   void gather(const float* first, const float* second);
@@ -93,6 +101,7 @@ class AnswerFit {
   std::vector<uint32_t> candidates_;
   std::vector<float> losses_;      // by candidate and sample
   std::vector<uint32_t> met_;      // the planes that the samples meet, each once
+  std::vector<char> tried_;        // by index in met_: it is a candidate, or needs not be
   std::vector<uint32_t> kind_of_;  // by plane: its index in met_
   std::vector<uint32_t> kinds_;    // by sample: its plane's index in met_
   std::vector<float> unlike_;      // by candidate's and met plane

@@ -202,11 +202,25 @@ class Filler {
     return p;
   }
 
+  // Into points_: of every patch of a side the same as patch_point.
+  void set_points(const Face& face, uint32_t n, float x, float y) {
+    points_.resize(n * n);
+    for (uint32_t row = 0; row < n; ++row) {
+      glm::vec3 p = patch_point(face, row * n, n, x, y);
+      for (uint32_t column = 0; column < n; ++column) {
+        if (row == 0) columns_[column] = lo_[face.u] + size_ * ((float(column) + x) / float(n));
+        p[face.u] = columns_[column];
+        points_[row * n + column] = p;
+      }
+    }
+  }
+
   // ---- far table ----
 
   void fill_far() {
     const uint32_t n = scene_.options.far_patches, patches = n * n;
     out_.far.assign(30u * patches * patches, LSP_ANSWER_EMPTY);
+    columns_.resize(n);
     lines_.emplace(scene_.triangles, records_, Box{lo_, lo_ + size_}, scene_.grid.margin);
     for (uint32_t in = 0; in < 6; ++in)
       for (uint32_t out = in + 1; out < 6; ++out)
@@ -241,10 +255,11 @@ class Filler {
     const glm::vec3 a = patch_point(face_in, p, n, r[0], r[1]);
     for (size_t k = 0; k < 4; ++k) row_.place[k][i] = 2 * r[k] - 1;
     for (int k = 0; k < 3; ++k) row_.origin[size_t(k)][i] = a[k] - centre_[k];
+    set_points(face_out, n, r[2], r[3]);
     for (size_t begin = 0; begin < wanted_.size(); begin += CellLines::kMost) {
       const auto part = std::span(wanted_).subspan(begin, std::min(CellLines::kMost, wanted_.size() - begin));
       ends_.clear();
-      for (uint32_t q : part) ends_.push_back(patch_point(face_out, q, n, r[2], r[3]));
+      for (uint32_t q : part) ends_.push_back(points_[q]);
       lines_->cast(a, ends_, first_, last_);
       for (size_t j = 0; j < part.size(); ++j) add_line(part[j], i, ends_[j] - a, j);
     }
@@ -436,8 +451,10 @@ class Filler {
   std::optional<CellLines> lines_;
   Row row_;
   std::vector<uint32_t> wanted_;  // patches whose shafts are not settled
-  std::vector<glm::vec3> ends_;   // of lines that are cast at once
-  CellLines::Hits first_, last_;  // of these
+  std::vector<float> columns_;
+  std::vector<glm::vec3> points_;  // where a line ends, by patch
+  std::vector<glm::vec3> ends_;    // of lines that are cast at once
+  CellLines::Hits first_, last_;   // of these
 
   // Of the sub-cell that is being filled.
   NearRays batch_;

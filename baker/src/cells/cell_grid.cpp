@@ -119,7 +119,7 @@ CellGrid sort_into_cells(std::span<const LspTriangle> triangles, const Box& boun
     for (size_t i = p * kPart; i < std::min(triangles.size(), (p + 1) * kPart); ++i)
       add_references(grid, triangles[i], uint32_t(i), parts[p]);
   });
-  // Sorted by cell, in each cell by record; a primitive that spatial splits repeat counts once.
+  // Sorted by cell, in each cell by record.
   std::vector<uint32_t> counts(grid.words.size());
   size_t total = 0;
   for (const auto& part : parts) {
@@ -135,24 +135,24 @@ CellGrid sort_into_cells(std::span<const LspTriangle> triangles, const Box& boun
   std::vector<uint32_t> sorted(total), cursor = begin;
   for (const auto& part : parts)
     for (const Reference& r : part) sorted[cursor[r.cell]++] = r.record;
-  std::vector<uint32_t> cell_records;
+  // A primitive that spatial splits repeat counts once.
+  uint32_t primitives = 0;
+  for (const LspTriangle& t : triangles) primitives = std::max(primitives, t.primitive + 1);
+  std::vector<uint32_t> last_cell(primitives, UINT32_MAX);  // that a primitive was found in
   for (size_t i = 0; i < counts.size(); ++i) {
     if (counts[i] == 0) continue;
-    cell_records.assign(sorted.begin() + begin[i], sorted.begin() + begin[i] + counts[i]);
-    std::stable_sort(cell_records.begin(), cell_records.end(),
-                     [&](uint32_t a, uint32_t b) { return triangles[a].primitive < triangles[b].primitive; });
-    const auto same = [&](uint32_t a, uint32_t b) {
-      return triangles[a].primitive == triangles[b].primitive;
-    };
-    cell_records.erase(std::unique(cell_records.begin(), cell_records.end(), same), cell_records.end());
-    std::sort(cell_records.begin(), cell_records.end());
+    const size_t first = grid.records.size();
+    for (uint32_t k = begin[i]; k < begin[i] + counts[i]; ++k) {
+      uint32_t& cell = last_cell[triangles[sorted[k]].primitive];
+      if (cell != i) grid.records.push_back(sorted[k]);
+      cell = uint32_t(i);
+    }
     const auto coordinate = int(i);
     grid.words[i] = LSP_CELL_FILLED | uint32_t(grid.cells.size());
     grid.cells.push_back({{coordinate % grid.dims.x, coordinate / grid.dims.x % grid.dims.y,
                            coordinate / grid.dims.x / grid.dims.y},
-                          uint32_t(grid.records.size()),
-                          uint32_t(cell_records.size())});
-    grid.records.insert(grid.records.end(), cell_records.begin(), cell_records.end());
+                          uint32_t(first),
+                          uint32_t(grid.records.size() - first)});
   }
   return grid;
 }

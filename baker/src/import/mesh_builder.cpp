@@ -1,8 +1,10 @@
 #include "import/mesh_builder.h"
 
+#include <tbb/parallel_for.h>
 #include <xxhash.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstring>
 
@@ -235,23 +237,25 @@ void MeshBuilder::smooth_missing() {
   std::vector<uint32_t> place(count * 3);
   {
     std::vector<uint32_t> next(begins.begin(), begins.end() - 1);
-    for (size_t t = 0; t < count; ++t) {
-      const glm::uvec3& triangle = mesh_.triangles[first + t];
-      const glm::dvec3 p[3] = {exact_[triangle.x], exact_[triangle.y], exact_[triangle.z]};
-      const glm::vec3 normal(geometric_normal(p[0], p[1], p[2]));
-      for (int i = 0; i < 3; ++i) {
-        const glm::dvec3 u = direction_of(p[(i + 1) % 3] - p[i]);
-        const glm::dvec3 v = direction_of(p[(i + 2) % 3] - p[i]);
-        const double sine = std::sqrt(glm::dot(glm::cross(u, v), glm::cross(u, v)));
-        place[3 * t + i] = next[triangle[i]]++;
-        by_position[place[3 * t + i]] = {normal, float(std::atan2(sine, glm::dot(u, v)))};
-        if (!groups.empty()) groups[place[3 * t + i]] = smoothing_[t];
-      }
-    }
+    for (size_t t = 0; t < count; ++t)
+      for (int i = 0; i < 3; ++i) place[3 * t + i] = next[mesh_.triangles[first + t][i]]++;
   }
+  tbb::parallel_for(size_t(0), count, [&](size_t t) {
+    const glm::uvec3& triangle = mesh_.triangles[first + t];
+    const glm::dvec3 p[3] = {exact_[triangle.x], exact_[triangle.y], exact_[triangle.z]};
+    const glm::vec3 normal(geometric_normal(p[0], p[1], p[2]));
+    for (int i = 0; i < 3; ++i) {
+      const glm::dvec3 u = direction_of(p[(i + 1) % 3] - p[i]);
+      const glm::dvec3 v = direction_of(p[(i + 2) % 3] - p[i]);
+      const double sine = std::sqrt(glm::dot(glm::cross(u, v), glm::cross(u, v)));
+      by_position[place[3 * t + i]] = {normal, float(std::atan2(sine, glm::dot(u, v)))};
+      if (!groups.empty()) groups[place[3 * t + i]] = smoothing_[t];
+    }
+  });
 
-  uint64_t too_many = 0;
-  for (const uint32_t t : unsmooth_) {
+  std::atomic<uint64_t> too_many = 0;
+  tbb::parallel_for(size_t(0), unsmooth_.size(), [&](size_t k) {
+    const uint32_t t = unsmooth_[k];
     for (int i = 0; i < 3; ++i) {
       glm::vec3& normal = mesh_.normals[t][i];
       if (!std::isnan(normal.x)) continue;
@@ -264,18 +268,18 @@ void MeshBuilder::smooth_missing() {
         continue;
       }
       glm::dvec3 sum(0);
-      for (uint32_t k = begins[p]; k < begins[p + 1]; ++k) {
-        const Corner& corner = by_position[k];
-        if (!groups.empty() && groups[k] != groups[own_place]) continue;
+      for (uint32_t c = begins[p]; c < begins[p + 1]; ++c) {
+        const Corner& corner = by_position[c];
+        if (!groups.empty() && groups[c] != groups[own_place]) continue;
         if (glm::dot(corner.face_normal, own) >= crease_cosine_)
           sum += glm::dvec3(corner.face_normal) * double(corner.angle);
       }
       const glm::dvec3 smooth = direction_of(sum);
       if (smooth != glm::dvec3(0)) normal = glm::vec3(smooth);
     }
-  }
-  if (too_many) {
-    note(file_ + ": " + std::to_string(too_many) + " corners lie where more than " +
+  });
+  if (too_many > 0) {
+    note(file_ + ": " + std::to_string(too_many.load()) + " corners lie where more than " +
          std::to_string(kMaxSmoothValence) + " triangles meet, their normals stay flat");
   }
   budget_.release(temporary);
