@@ -2,6 +2,7 @@
 
 #include <zstd.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -43,6 +44,31 @@ std::vector<std::vector<std::string>> listed_sources(std::span<const std::byte> 
   return lists;
 }
 
+// Whether META can have written the name of a file so: as '?' each byte that is not UTF-8, or not printable.
+bool stands_for(const std::string& listed, const std::string& name) {
+  return std::equal(listed.begin(), listed.end(), name.begin(), name.end(), [](char l, char n) {
+    return l == n || (l == '?' && (uint8_t(n) < 0x20 || uint8_t(n) >= 0x7F));
+  });
+}
+
+// The file of a name in META, beside an input; empty where there is none.
+std::filesystem::path find_listed(std::filesystem::path folder, const std::filesystem::path& listed) {
+  for (const std::filesystem::path& part : listed) {
+    std::error_code error;
+    std::filesystem::path next = folder / part;
+    if (!std::filesystem::exists(next, error) && part.native().find('?') != std::string::npos) {
+      const std::filesystem::directory_iterator end;
+      std::filesystem::directory_iterator at(folder.empty() ? "." : folder, error);
+      for (; !error && at != end; at.increment(error)) {
+        if (stands_for(part.native(), at->path().filename().native())) next = at->path();
+      }
+    }
+    folder = std::move(next);
+  }
+  std::error_code error;
+  return std::filesystem::is_regular_file(folder, error) ? folder : std::filesystem::path();
+}
+
 }  // namespace
 
 Hash128 hash_sources(std::span<const std::filesystem::path> inputs, std::span<const std::byte> baked) {
@@ -55,9 +81,8 @@ Hash128 hash_sources(std::span<const std::filesystem::path> inputs, std::span<co
   for (size_t i = 0; i < inputs.size(); ++i) {
     add(inputs[i]);
     for (size_t k = 1; i < lists.size() && k < lists[i].size(); ++k) {
-      const std::filesystem::path path = inputs[i].parent_path() / lists[i][k];
-      std::error_code error;
-      if (std::filesystem::is_regular_file(path, error)) add(path);
+      const std::filesystem::path path = find_listed(inputs[i].parent_path(), lists[i][k]);
+      if (!path.empty()) add(path);
     }
   }
   return hasher.digest();

@@ -56,6 +56,12 @@ lsp_status lsp::check_options(const lsp_trace_options& options, lsp_error* error
     return fail(error, LSP_ERROR_UNSUPPORTED, 0,
                 "library version %s does not know quality %u: use LSP_QUALITY_*", LSP_LIBRARY_VERSION_STRING,
                 options.quality);
+  if (!(options.lod >= 0 && std::isfinite(options.lod)))
+    return fail(error, LSP_ERROR_INVALID, 0, "lod is %g: give a finite number, 0 or more",
+                double(options.lod));
+  if ((options.flags & LSP_TRACE_MAX_LOSS) != 0 && !(options.max_loss >= 0 && options.max_loss <= 100))
+    return fail(error, LSP_ERROR_INVALID, 0, "max_loss is %g: give per cent, 0 to 100",
+                double(options.max_loss));
   return LSP_OK;
 }
 

@@ -5,7 +5,8 @@
 
 namespace lsp {
 
-// Refuses flags and qualities that the library does not know: LSP_ERROR_UNSUPPORTED and *error.
+// Refuses flags and qualities that the library does not know, LSP_ERROR_UNSUPPORTED, and numbers that say
+// nothing, LSP_ERROR_INVALID; with *error.
 lsp_status check_options(const lsp_trace_options& options, lsp_error* error);
 
 // Whether `options` has the scene's tables answer.

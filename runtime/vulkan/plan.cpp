@@ -334,7 +334,7 @@ extern "C" int lsp_vulkan_next_copy(const lsp_scene* scene, const lsp_vulkan_pla
       copy->buffer = i;
       copy->buffer_offset = offset;
       copy->source = static_cast<const unsigned char*>(scene->bytes) + buffer.file_offset + offset;
-      copy->bytes = left < max_bytes ? left : max_bytes;
+      copy->bytes = max_bytes == 0 || left < max_bytes ? left : max_bytes;
       *cursor += copy->bytes;
       return 1;
     }

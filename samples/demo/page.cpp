@@ -34,6 +34,11 @@ std::string psnr(const nlohmann::json& compare) {
   return compare.at("psnr_db").is_null() ? "equal pictures" : format("%.1f dB", number(compare, "psnr_db"));
 }
 
+std::string mean_error(const nlohmann::json& compare) {
+  return compare.at("relative_mean").is_null() ? "infinite"  // the exact picture is black
+                                               : format("%.2f %%", 100 * number(compare, "relative_mean"));
+}
+
 double times(const nlohmann::json& exact, const nlohmann::json& approximate) {
   const double base = number(exact, "indirect_mrays_per_second");
   return base > 0 ? number(approximate, "indirect_mrays_per_second") / base : 0;
@@ -103,6 +108,7 @@ std::string curve(const Figures& f) {
   double widest = 0;
   double fastest = 1;
   for (const Figures::Setting& q : f.curve) {
+    if (q.compare.at("relative_mean").is_null()) continue;  // all is black but the error
     points.push_back({100 * number(q.compare, "relative_mean"), times(f.curve_exact, q.approximate), q.name,
                       !is_number(q.name)});
     widest = std::max(widest, points.back().error);
@@ -271,7 +277,7 @@ std::string time_and_error(const Figures& f) {
   html += row("mean luminance", format("%.4f", number(f.exact, "mean_luminance")),
               format("%.4f", number(f.approximate, "mean_luminance")));
   html += row("RMSE, linear", "0", format("%.4f", number(f.compare, "rmse")));
-  html += row("mean error", "0", format("%.2f %% of the mean", 100 * number(f.compare, "relative_mean")));
+  html += row("mean error", "0", mean_error(f.compare) + " of the mean");
   html += row("PSNR as shown", "", psnr(f.compare));
   html += row("pixels that differ visibly", "0",
               format("%.2f %%", 100 * number(f.compare, "pixels_over_5_percent")));
@@ -362,17 +368,16 @@ std::string make_summary(const Figures& f) {
   };
   line("exact:      ", f.exact);
   line("approximate:", f.approximate);
-  text +=
-      format("difference:  %.2f times the rays a second; %s, mean error %.2f %%, %.2f %% of pixels visibly\n",
-             speed_up(f, f.approximate),
-             (f.compare.at("psnr_db").is_null() ? "equal pictures" : "PSNR " + psnr(f.compare)).c_str(),
-             100 * number(f.compare, "relative_mean"), 100 * number(f.compare, "pixels_over_5_percent"));
+  text += format("difference:  %.2f times the rays a second; %s, mean error %s, %.2f %% of pixels visibly\n",
+                 speed_up(f, f.approximate),
+                 (f.compare.at("psnr_db").is_null() ? "equal pictures" : "PSNR " + psnr(f.compare)).c_str(),
+                 mean_error(f.compare).c_str(), 100 * number(f.compare, "pixels_over_5_percent"));
   // Settings that are qualities.
   std::string qualities;
   for (const Figures::Setting& s : f.curve) {
     if (is_number(s.name)) continue;
-    qualities += format("%s %s %.2f times, %.2f %%", qualities.empty() ? "" : ";", s.name.c_str(),
-                        times(f.curve_exact, s.approximate), 100 * number(s.compare, "relative_mean"));
+    qualities += format("%s %s %.2f times, %s", qualities.empty() ? "" : ";", s.name.c_str(),
+                        times(f.curve_exact, s.approximate), mean_error(s.compare).c_str());
   }
   if (!qualities.empty()) text += "dial:        in a small picture, not denoised:" + qualities + "\n";
   return text;

@@ -50,7 +50,9 @@ Comparison compare(const Picture& reference, const Picture& test) {
   result.rmse = std::sqrt(result.rmse / count);
   result.mean_reference /= count;
   result.mean_test /= count;
-  result.relative_mean = result.mean_reference > 0 ? result.mean_absolute / result.mean_reference : 0;
+  if (result.mean_absolute > 0)
+    result.relative_mean = result.mean_reference > 0 ? result.mean_absolute / result.mean_reference
+                                                     : std::numeric_limits<double>::infinity();
   result.psnr_db = encoded_square > 0 ? -10.0 * std::log10(encoded_square / count)
                                       : std::numeric_limits<double>::infinity();
   return result;

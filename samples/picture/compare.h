@@ -8,7 +8,7 @@ namespace lsp::sample {
 struct Comparison {
   double mean_absolute = 0;   // of the channels' differences, linear
   double rmse = 0;            // linear
-  double relative_mean = 0;   // mean absolute difference over the mean of the reference
+  double relative_mean = 0;   // mean absolute difference over the reference's mean; infinity if it is black
   double psnr_db = 0;         // of the tone-mapped, sRGB-encoded pictures, peak 1; infinity if they are equal
   double mean_reference = 0;  // mean of the reference's channels
   double mean_test = 0;

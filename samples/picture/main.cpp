@@ -17,6 +17,11 @@ std::string text(double value) {
   return digits;
 }
 
+// JSON has no infinity: of equal pictures' PSNR, of errors against a black reference.
+nlohmann::ordered_json finite_or_null(double value) {
+  return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json();
+}
+
 std::string size_of(const lsp::sample::Picture& picture) {
   return std::to_string(picture.width) + "x" + std::to_string(picture.height);
 }
@@ -63,14 +68,12 @@ int main(int argc, char** argv) {
     if (common.json) {
       nlohmann::ordered_json json = {{"mean_absolute", c.mean_absolute},
                                      {"rmse", c.rmse},
-                                     {"relative_mean", c.relative_mean},
+                                     {"relative_mean", finite_or_null(c.relative_mean)},
                                      {"mean_reference", c.mean_reference},
                                      {"mean_test", c.mean_test},
                                      {"pixels_over_5_percent", far_share},
-                                     {"factor", factor}};
-      // JSON has no infinity; equal pictures have no PSNR.
-      json["psnr_db"] =
-          std::isfinite(c.psnr_db) ? nlohmann::ordered_json(c.psnr_db) : nlohmann::ordered_json();
+                                     {"factor", factor},
+                                     {"psnr_db", finite_or_null(c.psnr_db)}};
       json_result() = json;
     } else if (!common.quiet) {
       std::cout << "RMSE " << c.rmse << ", mean absolute " << c.mean_absolute;

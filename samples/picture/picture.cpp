@@ -95,6 +95,7 @@ Picture read_pfm(const std::filesystem::path& path) {
   float scale = 0;
   file >> magic >> width >> height >> scale;
   file.get();  // the one white space before the data
+  const std::streamoff head = file.tellg();
   constexpr int64_t kLargest = 1 << 15;
   if (!file || magic != "PF" || width < 1 || height < 1 || width > kLargest || height > kLargest ||
       !std::isfinite(scale) || scale == 0) {
@@ -104,6 +105,10 @@ Picture read_pfm(const std::filesystem::path& path) {
   const uint64_t size = std::filesystem::file_size(path, error);
   const uint64_t bytes = static_cast<uint64_t>(width) * static_cast<uint64_t>(height) * sizeof(glm::vec3);
   if (error || size < bytes) throw Failure(Exit::kInvalid, path.string(), "ends early; write it again");
+  if (const uint64_t whole = static_cast<uint64_t>(head) + bytes; size > whole)
+    throw Failure(Exit::kInvalid, path.string(),
+                  "has " + std::to_string(size - whole) + " bytes more than its " + std::to_string(width) +
+                      " x " + std::to_string(height) + " pixels; write it again");
 
   Picture picture(static_cast<int>(width), static_cast<int>(height));
   for (int64_t y = height - 1; y >= 0; --y) {

@@ -81,6 +81,7 @@ bool has_cells(const RenderScene& scene) {
 
 std::string dial_name(const lsp_trace_options& options, const RenderScene& scene) {
   char text[64] = "approximate";
+  if (!scene.has_tables()) return "exact, no tables";  // what approximate rays are then
   if (!has_cells(scene)) {
     if (options.lod > 0) std::snprintf(text, sizeof text, "lod %g", static_cast<double>(options.lod));
   } else if ((options.flags & LSP_TRACE_MAX_LOSS) != 0) {

@@ -328,6 +328,17 @@ TEST_F(LspBake, NamesNeedNotBeUtf8) {
   EXPECT_EQ(shell("lsp-validate 'l\xE4n.lsp' --mesh 'l\xE4n.obj'", folder_), 0);
 }
 
+// META is UTF-8 and has '?' for what is none: the file that it means is found all the same, and compared.
+TEST_F(LspBake, NamesBesideAMeshNeedNotBeUtf8) {
+  std::ofstream(folder_ / "gr\xFCn.mtl") << "newmtl a\nKd 0 1 0\n";
+  std::ofstream(folder_ / "green.obj")
+      << "mtllib gr\xFCn.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  ASSERT_EQ(run("green.obj -o green.lsp --base wide --json"), 0) << read("err");
+  EXPECT_EQ(shell("lsp-validate green.lsp --mesh green.obj", folder_), 0);
+  std::ofstream(folder_ / "gr\xFCn.mtl") << "newmtl a\nKd 0 0 1\n";
+  EXPECT_EQ(shell("lsp-validate --quiet green.lsp --mesh green.obj 2>/dev/null", folder_), 7);
+}
+
 // A device that cannot be replaced is written to, and what was printed has come out or is no success.
 TEST_F(LspBake, AFullDeviceIsAnError) {
   fs::create_symlink("/dev/full", folder_ / "full");

@@ -223,8 +223,10 @@ int main(int argc, char** argv) {
   app.add_option("SCENE", arguments.scenes,
                  "Mesh files, baked in several ways, or .lsp files, measured as they are")
       ->required();
-  app.add_option("-o,--output", arguments.output,
-                 "Folder for the report; bakes go to its subfolder bakes, where a later run finds them")
+  app.add_option(
+         "-o,--output", arguments.output,
+         "Folder for the report, in place of one that is there: its tables, plots and pictures go. Bakes "
+         "are in the subfolder bakes, where a later run finds them")
       ->required();
   app.add_option("--suite", arguments.suites,
                  "paper, pareto, scaling, peers, stress, pictures or instances; may be repeated (default: "

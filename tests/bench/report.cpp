@@ -2,6 +2,8 @@
 
 #include <cmath>
 #include <cstdio>
+#include <fstream>
+#include <map>
 
 #include "html_text.h"
 #include "lsp/output_file.h"
@@ -103,6 +105,41 @@ std::string list_html(const char* name, const std::vector<std::string>& items) {
   return html + "</ul>\n";
 }
 
+// What lies beside report.html and report.json, by name.
+std::map<std::string, std::string> extra_files(const Report& report) {
+  std::map<std::string, std::string> files;
+  for (const Section& section : report.sections) {
+    for (const Table& table : section.tables) files[table.id + ".csv"] = to_csv(table);
+    for (const Plot& plot : section.plots) files[plot.id + ".svg"] = to_svg(plot);
+    for (const PictureGrid& grid : section.pictures) {
+      for (const Picture& picture : grid.pictures)
+        files[picture.id + (picture.jpeg ? ".jpg" : ".png")] = picture.bytes;
+    }
+  }
+  return files;
+}
+
+// A report in the same folder has listed its files: those that are not written anew would look as if they
+// belonged to this one. Nothing else in the folder is touched, whatever that list says.
+void remove_earlier(const std::filesystem::path& directory, const std::map<std::string, std::string>& files) {
+  std::ifstream in(directory / "report.json");
+  const Json earlier = Json::parse(in, nullptr, false);
+  if (!earlier.is_object() || !earlier.contains("files") || !earlier["files"].is_array()) return;
+  for (const Json& file : earlier["files"]) {
+    if (!file.is_string()) continue;
+    const std::filesystem::path name = file.get<std::string>();
+    const std::string ending = name.extension().string();
+    const bool ours = ending == ".csv" || ending == ".svg" || ending == ".png" || ending == ".jpg";
+    if (!ours || name != name.filename() || files.contains(name.string())) continue;
+    std::error_code error;
+    std::filesystem::remove(directory / name, error);
+    if (error)
+      throw Failure(Exit::kFile, (directory / name).string(),
+                    "is of an earlier report and cannot be removed: " + error.message() +
+                        "; remove it or give another folder with -o");
+  }
+}
+
 }  // namespace
 
 std::string to_csv(const Table& table) {
@@ -139,6 +176,7 @@ Json to_json(const Report& report) {
     out["paragraphs"] = section.paragraphs;
     for (const Table& table : section.tables) out["tables"][table.id] = table.rows;
   }
+  for (const auto& [name, bytes] : extra_files(report)) json["files"].push_back(name);
   return json;
 }
 
@@ -182,15 +220,11 @@ void write_report(const Report& report, const std::filesystem::path& directory) 
   std::error_code error;
   std::filesystem::create_directories(directory, error);
   if (error) throw Failure(Exit::kFile, directory.string(), "cannot be made: " + error.message());
-  for (const Section& section : report.sections) {
-    for (const Table& table : section.tables) write_file(directory / (table.id + ".csv"), to_csv(table));
-    for (const Plot& plot : section.plots) write_file(directory / (plot.id + ".svg"), to_svg(plot));
-    for (const PictureGrid& grid : section.pictures) {
-      for (const Picture& picture : grid.pictures)
-        write_file(directory / (picture.id + (picture.jpeg ? ".jpg" : ".png")), picture.bytes);
-    }
-  }
-  write_file(directory / "report.json", to_json(report).dump(1) + "\n");
+  const std::map<std::string, std::string> files = extra_files(report);
+  for (const auto& [name, bytes] : files) write_file(directory / name, bytes);
+  remove_earlier(directory, files);
+  write_file(directory / "report.json",
+             to_json(report).dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
   write_file(directory / "report.html", to_html(report));
 }
 

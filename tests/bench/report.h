@@ -90,7 +90,9 @@ Json to_json(const Report& report);
 std::string to_html(const Report& report);
 
 // Writes report.html, report.json, one .csv per table, one .svg per plot and one .png or .jpg per picture
-// into `directory`, which it makes. Each file is written aside and renamed. Throws Failure(kFile).
+// into `directory`, which it makes. Each file is written aside and renamed; report.json lists those beside
+// the page, and of a report that was there before the listed ones that this one lacks are removed. Throws
+// Failure(kFile).
 void write_report(const Report& report, const std::filesystem::path& directory);
 
 }  // namespace lsp::bench

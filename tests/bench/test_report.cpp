@@ -10,6 +10,7 @@
 #include "lsp/in_chunks.hpp"
 #include "picture_page.h"
 #include "report.h"
+#include "temporary_folder.h"
 #include "timing.h"
 
 namespace lsp::bench {
@@ -76,6 +77,37 @@ TEST(Report, IsWrittenWhole) {
     EXPECT_TRUE(std::filesystem::exists(directory / name)) << name;
   }
   std::filesystem::remove_all(directory);
+}
+
+// Names of scenes need not be UTF-8, and JSON is.
+TEST(Report, IsJsonWhateverAFileIsCalled) {
+  const test::TemporaryFolder folder;
+  Report report = sample();
+  report.warnings = {"l\xE4n.ply: left out"};
+  write_report(report, folder.path());
+  EXPECT_EQ(Json::parse(std::ifstream(folder.path() / "report.json"))["warnings"][0],
+            "l\xEF\xBF\xBDn.ply: left out");
+}
+
+// A table of a suite that the later run did not ask for would look like its own.
+TEST(Report, TakesThePlaceOfAnEarlierOne) {
+  const test::TemporaryFolder folder;
+  const std::filesystem::path directory = folder.path() / "report";
+  write_report(sample(), directory);
+  std::ofstream(directory / "mine.csv") << "not of a report\n";
+  std::ofstream(folder.path() / "outside.csv") << "not in the folder\n";
+  Json json = Json::parse(std::ifstream(directory / "report.json"));
+  json["files"].push_back("../outside.csv");
+  std::ofstream(directory / "report.json") << json;
+
+  Report later = sample();
+  later.sections[0].tables[0].id = "others";
+  later.sections[0].plots.clear();
+  write_report(later, directory);
+  for (const char* gone : {"numbers.csv", "plot.svg"})
+    EXPECT_FALSE(std::filesystem::exists(directory / gone)) << gone;
+  for (const char* there : {"others.csv", "dot.png", "mine.csv", "../outside.csv", "report.html"})
+    EXPECT_TRUE(std::filesystem::exists(directory / there)) << there;
 }
 
 TEST(PicturePage, ShowsWhereSomethingIsThatANoiseFilterWouldLeave) {

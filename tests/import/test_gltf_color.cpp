@@ -216,6 +216,18 @@ TEST_F(GltfColor, ATextureWithoutAPictureIsNotedAsThat) {
   EXPECT_EQ(mesh.notes.size(), 3u);
 }
 
+TEST_F(GltfColor, SamplersThatSayNothingAreNoted) {
+  const auto notes_of = [&](json sampler, int number) {
+    Square square;
+    square.base()["baseColorTexture"] = square.texture(rgba_png(1, 1, {255, 0, 0, 255}), std::move(sampler));
+    square.document.root["textures"][0]["sampler"] = number;
+    return import(square);
+  };
+  EXPECT_TRUE(notes_of({{"wrapS", 10497}, {"wrapT", 33648}}, 0).notes.empty());
+  EXPECT_TRUE(has_note(notes_of({{"wrapT", 10496}}, 0), "the wrap mode of a sampler, 10496, is not known"));
+  EXPECT_TRUE(has_note(notes_of({}, 1), "a texture has a sampler that is not there, it is repeated"));
+}
+
 TEST_F(GltfColor, PicturesBesideTheFileAndInIt) {
   const std::string png = rgba_png(1, 1, {255, 0, 0, 255});
   write("a b.png", png);

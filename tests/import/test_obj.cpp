@@ -164,8 +164,8 @@ TEST_F(Obj, TexturesWithTheirOptions) {
   EXPECT_NEAR(color_with("map_d grey.png\n", all).color(0).coverage, 0.2f, 1e-4f) << "grey is what is solid";
   EXPECT_NEAR(color_with("map_d -imfchan r a picture.png\n", all).color(0).coverage, 0.5f, 0.3f);
   EXPECT_NEAR(color_with("map_Ke a picture.png\nKe 4 4 4\n", lower_left).color(0).emission.b, 4.0f, 0.4f);
-  const Mesh noted = color_with("map_Bump -bm 2 x.png\nmap_Kd -mm 0 2 gone.png\n", all);
-  for (const char* part : {"map_Bump", "-mm", "gone.png"}) EXPECT_TRUE(has_note(noted, part)) << part;
+  const Mesh noted = color_with("map_Bump -bm 2 x.png\nmap_Kd -boost 2 gone.png\n", all);
+  for (const char* part : {"map_Bump", "-boost", "gone.png"}) EXPECT_TRUE(has_note(noted, part)) << part;
 }
 
 TEST_F(Obj, OpacityInEitherForm) {

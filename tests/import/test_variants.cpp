@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "gltf_builder.h"
+#include "import/texture.h"
 #include "png_bytes.h"
 
 namespace {
@@ -434,8 +435,33 @@ TEST_F(Variants, MapOptionsThatChangeNothingAreNoNotes) {
   const Mesh mesh = import("a.obj", obj);
   EXPECT_EQ(mesh.color(0).base_color, glm::vec3(1, 0, 0));
   EXPECT_TRUE(mesh.notes.empty());
-  write("a.mtl", "newmtl m\nmap_Kd -mm 0.2 1 red.png\n");
-  EXPECT_TRUE(has_note(import("a.obj", obj), "the option -mm of a map is not read"));
+  write("a.mtl", "newmtl m\nmap_Kd -boost 2 red.png\n");
+  EXPECT_TRUE(has_note(import("a.obj", obj), "the option -boost of a map is not read"));
+}
+
+// -mm BASE GAIN is of the values that the picture stores; the same picture may be there without it.
+TEST_F(Variants, MapRangesAreRead) {
+  write("grey.png", rgba_png(1, 1, {100, 50, 200, 255}));
+  const std::string square = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\n", f = "f 1/1 2/1 3/1\n";
+  const auto linear = [](int stored) { return float(lsp::linear_of_srgb(stored / 255.0)); };
+  write(
+      "a.mtl",
+      "newmtl m\nmap_Kd -mm 0.2 0.5 grey.png\nnewmtl n\nmap_Kd grey.png\nnewmtl o\nmap_d -mm 0.2 grey.png\n");
+  const Mesh mesh =
+      import("a.obj", "mtllib a.mtl\n" + square + "usemtl m\n" + f + "usemtl n\n" + f + "usemtl o\n" + f);
+  EXPECT_TRUE(mesh.notes.empty()) << mesh.notes[0];
+  ASSERT_EQ(mesh.triangles.size(), 3u);
+  const glm::vec3 changed = mesh.color(0).base_color, plain = mesh.color(1).base_color;
+  EXPECT_NEAR(changed.r, linear(101), 1e-5f);
+  EXPECT_NEAR(changed.g, linear(76), 1e-5f);
+  EXPECT_NEAR(changed.b, linear(151), 1e-5f);
+  EXPECT_NEAR(plain.b, linear(200), 1e-5f);
+  const float luma = (0.2126f * 151 + 0.7152f * 101 + 0.0722f * 251) / 255;
+  EXPECT_NEAR(mesh.color(2).coverage, luma, 0.003f);
+  write("a.mtl", "newmtl m\nmap_Kd -mm 0.5 1 grey.png\n");
+  const Mesh clipped = import("a.obj", "mtllib a.mtl\n" + square + "usemtl m\n" + f);
+  EXPECT_EQ(clipped.color(0).base_color.b, 1.0f);
+  EXPECT_TRUE(has_note(clipped, "-mm takes values of the picture grey.png out of 0 to 1"));
 }
 
 TEST_F(Variants, MapOptionsInAnyCaseUnknownOnesAndNamesLikeThem) {

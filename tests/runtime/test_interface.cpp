@@ -1,10 +1,12 @@
 // The C interface beside files and rays: versions, statuses, and options that are not known.
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cmath>
 #include <set>
 #include <string>
 
-#include "lsp/lsp_instances.h"
+#include "lsp/lsp.hpp"
 #include "lsp/program.h"
 #include "scene_builder.h"
 
@@ -55,6 +57,37 @@ TEST(Interface, RefusesOptionsThatItDoesNotKnow) {
       trace({LSP_TRACE_ALL_FLAGS | LSP_TRACE_MAX_LOSS | LSP_TRACE_OCCLUSION, 0, LSP_QUALITY_ACCURATE, 5}),
       LSP_OK);
   EXPECT_EQ(counts.rays, 1u);
+}
+
+// Of numbers out of their range a trace would be one that nobody asked for.
+TEST(Interface, RefusesNumbersThatSayNothing) {
+  Bytes bytes = write_raw(build_parts({}));
+  lsp_scene scene;
+  ASSERT_EQ(lsp_open(bytes.data(), bytes.size(), &scene, nullptr), LSP_OK);
+  const LspRay ray = {{0, 0, -9}, 0, {0, 0, 1}, 100};
+  LspHit hit = {};
+  hit.primitive = 77;
+  lsp_error error;
+  const auto trace = [&](float lod, uint32_t flags, float max_loss) {
+    const lsp_trace_options options{LSP_TRACE_APPROXIMATE | flags, lod, 0, max_loss};
+    return lsp_trace(&scene, &options, &ray, &hit, 1, nullptr, &error);
+  };
+  for (const float lod : {NAN, -0.5f, INFINITY}) {
+    EXPECT_EQ(trace(lod, 0, 0), LSP_ERROR_INVALID) << lod;
+    EXPECT_EQ(std::string(error.message).rfind("lod is ", 0), 0u) << error.message;
+  }
+  for (const float max_loss : {NAN, -1.0f, 100.5f, INFINITY}) {
+    EXPECT_EQ(trace(0, LSP_TRACE_MAX_LOSS, max_loss), LSP_ERROR_INVALID) << max_loss;
+    EXPECT_EQ(std::string(error.message).rfind("max_loss is ", 0), 0u) << error.message;
+    lsp_instances none{};
+    const lsp_trace_options options{LSP_TRACE_MAX_LOSS, 0, 0, max_loss};
+    EXPECT_EQ(lsp_trace_instances(&none, &options, 255, &ray, &hit, 1, nullptr, &error), LSP_ERROR_INVALID);
+    LspHit cpp_hit[1];
+    EXPECT_THROW(lsp::trace(scene, options, std::array{ray}, cpp_hit), lsp::Error);
+  }
+  EXPECT_EQ(hit.primitive, 77u) << "nothing is traced";
+  EXPECT_EQ(trace(0, 0, NAN), LSP_OK) << "max_loss is not asked for";
+  EXPECT_EQ(trace(1, LSP_TRACE_MAX_LOSS, 100), LSP_OK);
 }
 
 // One lsp_error serves call after call: what an earlier one said must not be read as the last one's.

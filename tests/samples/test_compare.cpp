@@ -55,6 +55,12 @@ TEST(Compare, PsnrIsOfWhatIsShown) {
   EXPECT_NEAR(compare(filled(4, 4, 0.0f), filled(4, 4, 1e4f)).psnr_db, 0.0, 0.01);
 }
 
+// A share of nothing is not 0, unless nothing differs.
+TEST(Compare, ErrorAgainstABlackReferenceIsNotZero) {
+  EXPECT_TRUE(std::isinf(compare(filled(2, 2, 0.0f), filled(2, 2, 0.25f)).relative_mean));
+  EXPECT_EQ(compare(filled(2, 2, 0.0f), filled(2, 2, 0.0f)).relative_mean, 0);
+}
+
 TEST(Compare, DifferenceIsAmplified) {
   const Picture d = difference(filled(1, 1, 0.5f), filled(1, 1, 0.25f), 4.0f);
   EXPECT_EQ(d.pixels[0], glm::vec3(1.0f));
@@ -78,7 +84,8 @@ TEST(Pfm, DamagedFilesAreRefused) {
   for (const std::string& bytes : {std::string(), std::string("PF\n"), std::string("PF\n-1 4\n-1.0\n"),
                                    std::string("PF\n99999999 99999999\n-1.0\n"), std::string("PF\n4 4\n0\n"),
                                    std::string("PF\n4 4\nnan\n"), std::string("PF\n4 4\n-1.0\nshort"),
-                                   std::string("Pf\n1 1\n-1.0\n0000"), std::string(100, '\xff')}) {
+                                   std::string("Pf\n1 1\n-1.0\n0000"), std::string(100, '\xff'),
+                                   "PF\n1 1\n-1.0\n" + std::string(13, '\0')}) {
     const TemporaryFile file("damaged.pfm");
     std::ofstream(file.path(), std::ios::binary) << bytes;
     EXPECT_THROW(read_pfm(file.path()), Failure) << bytes.substr(0, 20);

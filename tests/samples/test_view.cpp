@@ -241,6 +241,9 @@ TEST_F(View, StartsApproximateAndWellExposed) {
     EXPECT_GT(seen[tables ? "approximate" : "exact"]["rays"], 0);
     EXPECT_EQ(seen[tables ? "exact" : "approximate"]["rays"], 0);
   }
+  // On the right of the line it has no tables to answer from, and says so.
+  ASSERT_EQ(view(file("wide.lsp") + " --frames 1 --split 0"), 0);
+  EXPECT_EQ(report_["dial"], "exact, no tables");
   // With a camera it is as it is, unless it is asked for.
   ASSERT_EQ(view(file("cells.lsp") + " --quiet --frames 1"), 0);
   EXPECT_EQ(report_["exposure"], 0);

@@ -15,12 +15,6 @@ using nlohmann::json;
 
 namespace {
 
-Wrap wrap_of(const json& sampler, const char* key) {
-  constexpr int64_t kClampToEdge = 33071, kMirroredRepeat = 33648;
-  const int64_t mode = index_member(sampler, key);
-  return mode == kClampToEdge ? Wrap::kClamp : mode == kMirroredRepeat ? Wrap::kMirror : Wrap::kRepeat;
-}
-
 // What extensions name comes before what stands there for readers without them, but for KTX2.
 std::vector<int64_t> images_of(const json& texture) {
   const json& extensions = member(texture, "extensions");
@@ -66,6 +60,19 @@ std::optional<glm::dvec4> GltfTextures::mean(const json& info) {
   return at->second;
 }
 
+// Repeated where the sampler does not say, and with a note where nobody knows what it says.
+Wrap GltfTextures::wrap_of(const json& sampler, const char* key) {
+  constexpr int64_t kRepeat = 10497, kClampToEdge = 33071, kMirroredRepeat = 33648;
+  const json& mode = member(sampler, key);
+  if (mode.is_null() || mode == kRepeat) return Wrap::kRepeat;
+  if (mode == kClampToEdge) return Wrap::kClamp;
+  if (mode == kMirroredRepeat) return Wrap::kMirror;
+  note("the wrap mode of a sampler, " +
+       mode.dump(-1, ' ', false, json::error_handler_t::replace).substr(0, 32) +
+       ", is not known, its textures are repeated");
+  return Wrap::kRepeat;
+}
+
 TextureUse GltfTextures::use(const json& info, const AlphaRule& rule) {
   TextureUse use;
   if (info.is_null()) return use;
@@ -79,7 +86,10 @@ TextureUse GltfTextures::use(const json& info, const AlphaRule& rule) {
 // Wrap modes, the set of coordinates and KHR_texture_transform.
 void GltfTextures::place(const json& info, TextureUse& use) {
   const json& source = element(member(document_.looks, "textures"), index_member(info, "index"));
+  const json& number = member(source, "sampler");
   const json& sampler = element(member(document_.looks, "samplers"), index_member(source, "sampler"));
+  if (!number.is_null() && !sampler.is_object())
+    note("a texture has a sampler that is not there, it is repeated");
   use.wrap_x = wrap_of(sampler, "wrapS");
   use.wrap_y = wrap_of(sampler, "wrapT");
   constexpr int64_t kNearest = 9728;

@@ -35,6 +35,7 @@ class GltfTextures {
   Picture read_picture(int64_t image, std::string& why);
   std::string name_of(int64_t image) const;
   std::string picture_bytes(const nlohmann::json& image);
+  Wrap wrap_of(const nlohmann::json& sampler, const char* key);
   void place(const nlohmann::json& info, TextureUse& use);
   void note(const std::string& text) { builder_.note(document_.file + ": " + text); }
 

@@ -38,7 +38,6 @@ bool read_factor(std::string_view line, float& factor, std::set<std::string>& no
 
 // Whether numbers of an option that is not read are those that change nothing.
 bool says_nothing(std::string_view option, const glm::dvec2& values) {
-  if (equals_ignoring_case(option, "-mm")) return values == glm::dvec2(0, 1);
   return equals_ignoring_case(option, "-texres") ||
          values == (equals_ignoring_case(option, "-bm") ? glm::dvec2(1, 0) : glm::dvec2(0));
 }
@@ -68,9 +67,14 @@ MtlMap read_map(std::string_view line, std::set<std::string>& notes) {
       take_numbers(3, map.offset);
     } else if (is("-s")) {
       take_numbers(3, map.scale);
-    } else if (is("-t") || is("-mm") || is("-bm") || is("-boost") || is("-texres")) {
-      glm::dvec2 values(0, is("-mm") ? 1 : 0);
-      take_numbers(is("-t") ? 3 : is("-mm") ? 2 : 1, values);
+    } else if (is("-mm")) {
+      glm::dvec2 range(map.base, map.gain);
+      take_numbers(2, range);
+      map.base = range.x;
+      map.gain = range.y;
+    } else if (is("-t") || is("-bm") || is("-boost") || is("-texres")) {
+      glm::dvec2 values(0);
+      take_numbers(is("-t") ? 3 : 1, values);
       if (!says_nothing(option, values))
         notes.insert("the option " + std::string(option) + " of a map is not read");
     } else if (take_word(line, value)) {

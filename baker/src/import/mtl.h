@@ -15,6 +15,7 @@ namespace lsp {
 struct MtlMap {
   std::string file;  // empty: none
   glm::dvec2 scale{1}, offset{0};
+  double base = 0, gain = 1;  // of -mm: a stored value v, of 0 to 1, stands for base + gain v
   bool clamp = false;
   char channel = 0;  // of map_d: r, g, b, m, l or z where the file says so
 };

@@ -1,6 +1,7 @@
 #include "import/mtl_textures.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "import/find_file.h"
 #include "import/source_file.h"
@@ -13,7 +14,7 @@ namespace {
 // All that decides a texture, in one text.
 std::string key_of(const MtlMaterial& source, const MtlMap& map) {
   std::string key = (source.folder / map.file).string() + '\0' + map.channel + (map.clamp ? 'c' : 'r');
-  for (const double value : {map.scale.x, map.scale.y, map.offset.x, map.offset.y})
+  for (const double value : {map.scale.x, map.scale.y, map.offset.x, map.offset.y, map.base, map.gain})
     key += ' ' + std::to_string(value);
   return key;
 }
@@ -45,6 +46,24 @@ Picture with_alpha(const Picture& color, const Picture& opacity, char channel) {
     }
   }
   return out;
+}
+
+// What -mm makes of the stored values, colours and alpha alike: a program that shows the picture brighter
+// knows nothing of linear light. Whether any was clipped.
+bool change_range(Picture& picture, double base, double gain) {
+  uint8_t table[256];
+  bool clips[256], clipped = false;
+  for (int i = 0; i < 256; ++i) {
+    const double value = 255 * base + gain * i, inside = std::min(std::max(value, 0.0), 255.0);
+    table[i] = uint8_t(inside + 0.5);
+    clips[i] = std::abs(value - inside) > 0.5;
+  }
+  for (size_t i = 0; i < picture.rgba.size(); ++i) {
+    uint8_t& value = picture.rgba[i];
+    clipped = clipped || (clips[value] && (i % 4 != 3 || picture.has_alpha));
+    value = table[value];
+  }
+  return clipped;
 }
 
 }  // namespace
@@ -112,6 +131,9 @@ Picture MtlTextures::read(const MtlMaterial& source, const MtlMap& map) {
     builder_.add_source(path);
     picture = decode_picture(file_, bytes, builder_.budget(), why);
     builder_.budget().release(bytes.size());
+    if ((map.base != 0 || map.gain != 1) && change_range(picture, map.base, map.gain))
+      builder_.note(file_ + ": the option -mm takes values of the picture " + map.file +
+                    " out of 0 to 1, they are clipped");
   }
   if (picture.turned) builder_.note(file_ + ": the picture " + map.file + kTurned);
   if (picture.rgba.empty())

@@ -29,7 +29,8 @@ LSP_API uint32_t lsp_version(void);
 typedef enum lsp_status {
   LSP_OK = 0,
   LSP_ERROR_FILE = 2,        /* the file cannot be read */
-  LSP_ERROR_INVALID = 3,     /* bytes that are no valid .lsp file, a transform without an inverse */
+  LSP_ERROR_INVALID = 3,     /* bytes that are no valid .lsp file, a transform without an inverse, an option
+                                that is no number or out of its range */
   LSP_ERROR_UNSUPPORTED = 5, /* a version, feature or section this library does not know, or a packed file */
   LSP_ERROR_LIMIT = 6,       /* a limit was exceeded: a buffer given is too small, a range too large */
 } lsp_status;
@@ -117,14 +118,15 @@ LSP_API lsp_status lsp_unpack(const void* bytes, uint64_t size, void* out, uint6
 #define LSP_DEFAULT(value)
 #endif
 
-/* All zero: exact, closest hits. A flag or a quality that the library does not know is refused. */
+/* All zero: exact, closest hits. A flag or a quality that the library does not know is refused
+ * (LSP_ERROR_UNSUPPORTED), and so is a lod or max_loss out of its range (LSP_ERROR_INVALID). */
 typedef struct lsp_trace_options {
   uint32_t flags; /* LSP_TRACE_* */
-  float
-      lod; /* theta: stop at a Line Space once its box's diagonal is under lod * distance; 0: deepest only */
+  float lod;      /* theta, finite, from 0 on: stop at a Line Space once its box's diagonal is under lod *
+                     distance; 0: deepest only */
   uint32_t quality LSP_DEFAULT(0); /* of cells: LSP_QUALITY_*, 0: balanced */
   float max_loss LSP_DEFAULT(0);   /* with LSP_TRACE_MAX_LOSS: where entries of cells lose more, in per cent,
-                       the cell is   traced exactly. 100: tables alone, 0: no entry is heeded */
+                       the cell is traced exactly: 0, no entry is heeded, to 100, tables alone */
 } lsp_trace_options;
 #undef LSP_DEFAULT
 
@@ -155,8 +157,8 @@ LSP_API void lsp_add_counts(lsp_trace_counts* sum, const lsp_trace_counts* more)
  * unless scene->cell_references is NULL: then nothing of cells is read. Exact any-hit rays of a file with
  * cells or wide nodes go down the tree 32 together, those that begin near each other of every 4,096.
  * LSP_ERROR_UNSUPPORTED when the file lacks what the options need: an exact tree; and when this library does
- * not know what they ask for: nothing is traced then. A file without Line Spaces (a scene too small to need
- * them) answers approximate traces exactly. */
+ * not know what they ask for; LSP_ERROR_INVALID where a number of them is out of its range: nothing is traced
+ * then. A file without Line Spaces (a scene too small to need them) answers approximate traces exactly. */
 LSP_API lsp_status lsp_trace(const lsp_scene* scene, const lsp_trace_options* options, const LspRay* rays,
                              LspHit* hits, uint64_t count, lsp_trace_counts* counts, lsp_error* error);
 

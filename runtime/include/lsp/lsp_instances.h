@@ -99,8 +99,8 @@ LSP_API lsp_status lsp_instances_build(const lsp_scene* const* assets, uint32_t 
  * number is named: the answer depends on neither the tree nor the order of rays. Hand it many rays at once:
  * those that are near the same instance are traced together.
  *
- * Adds to *counts unless it is NULL; nodes are then those of both kinds of trees. LSP_ERROR_UNSUPPORTED as of
- * lsp_trace, where any asset lacks what the options need, before anything is traced. */
+ * Adds to *counts unless it is NULL; nodes are then those of both kinds of trees. Errors are those of
+ * lsp_trace, where any asset lacks what the options need, too, before anything is traced. */
 LSP_API lsp_status lsp_trace_instances(const lsp_instances* instances, const lsp_trace_options* options,
                                        uint32_t mask, const LspRay* rays, LspHit* hits, uint64_t count,
                                        lsp_trace_counts* counts, lsp_error* error);

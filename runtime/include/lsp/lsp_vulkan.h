@@ -143,9 +143,9 @@ typedef struct lsp_vulkan_copy {
   uint64_t bytes;         /* of the piece */
 } lsp_vulkan_copy;
 
-/* The piece after *cursor (0 at first, then left alone), at most max_bytes, not 0, long; 0 when there is none
- * left. Pieces of 1 MiB keep a cold mapping fast. Copy it to mapped device-local memory, or to a staging
- * buffer and record the transfer with lsp_vulkan_record_copy. */
+/* The piece after *cursor (0 at first, then left alone), at most max_bytes long, with max_bytes 0 to the end
+ * of its buffer; 0 when there is none left. Pieces of 1 MiB keep a cold mapping fast. Copy it to mapped
+ * device-local memory, or to a staging buffer and record the transfer with lsp_vulkan_record_copy. */
 LSP_API int lsp_vulkan_next_copy(const lsp_scene* scene, const lsp_vulkan_plan* plan, uint64_t max_bytes,
                                  uint64_t* cursor, lsp_vulkan_copy* copy);
 

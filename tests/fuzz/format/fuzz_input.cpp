@@ -39,11 +39,12 @@ void trace_rays(const lsp_scene& scene, uint64_t seed, size_t count, bool valida
     const uint32_t dial = random.below(2) ? LSP_TRACE_MAX_LOSS : 0u;
     const lsp_trace_options options{flags | dial, random.unit(), uint32_t(random.below(LSP_QUALITY_COUNT)),
                                     110 * random.unit() - 5};
+    const bool sensible = dial == 0 || (options.max_loss >= 0 && options.max_loss <= 100);
     lsp_trace_counts counts{};
     const lsp_status status = lsp_trace(&scene, &options, rays.data(), hits.data(), count, nullptr, nullptr);
-    if (status != (able ? LSP_OK : LSP_ERROR_UNSUPPORTED))
+    if (status != (!sensible ? LSP_ERROR_INVALID : able ? LSP_OK : LSP_ERROR_UNSUPPORTED))
       found("lsp_trace does not do what the features promise");
-    if (!able) continue;
+    if (status != LSP_OK) continue;
     lsp_trace(&scene, &options, rays.data(), singly.data(), count, &counts, nullptr);
     if (validated && count != 0 && std::memcmp(hits.data(), singly.data(), count * sizeof(LspHit)) != 0)
       found("rays that are counted are answered otherwise");
