@@ -145,7 +145,7 @@ types:
         type: f4
       - id: ntree_margin
         type: f4
-      - id: reserved_1
+      - id: quality_part
         type: u4
         repeat: expr
         repeat-expr: 3

@@ -272,7 +272,8 @@ void keep_tables_only(Baked& baked) {
   h.root = LSP_NONE;
   h.max_depth = h.max_steps = h.max_leaf_triangles = 0;
   h.max_stack = 1;
-  for (uint32_t& dial : h.quality) dial = LSP_DIAL_TABLES;
+  for (uint32_t& classes : h.quality) classes = LSP_HEEDS_TABLES;
+  for (uint32_t& part : h.quality_part) part = 0;
   set_counts(baked);
 }
 
@@ -282,7 +283,8 @@ void leave_out_tables(Baked& baked, const std::string& reason) {
   set_counts(baked);  // while the file is still one of cells: of another the counts of their sections stay
   LspHeader& h = baked.header;
   h.cells = {};
-  for (uint32_t& dial : h.quality) dial = 0;
+  for (uint32_t& classes : h.quality) classes = 0;
+  for (uint32_t& part : h.quality_part) part = 0;
   baked.qualities = {};
   h.base_structure = LSP_BASE_WIDE;
   h.required_features = (h.required_features & ~LSP_FEATURE_CELLS) | LSP_FEATURE_WIDE | LSP_FEATURE_WIDE_BASE;

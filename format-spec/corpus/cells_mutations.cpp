@@ -22,9 +22,17 @@ void break_cells(Collector& c) {
   cells(c, RuleId::kOriginNotFinite, "origin_y is infinite",
         [](Image& i) { i.header.origin_y = 0x7FF0000000000000u; });
   cells(c, RuleId::kQualityRange, "balanced heeds 9 classes of loss",
-        [](Image& i) { i.header.quality[LSP_QUALITY_BALANCED] = LSP_DIAL(9u, 0u); });
+        [](Image& i) { i.header.quality[LSP_QUALITY_BALANCED] = LSP_HEEDS(9u, 0u); });
+  c.add(
+      RuleId::kQualityRange, "accurate heeds sixteen sixteenths of a class",
+      [] {
+        Image image = full_cells_scene(true);
+        image.header.quality_part[LSP_QUALITY_ACCURATE] = LSP_HEEDS(0u, 16u);
+        return encode(image);
+      }(),
+      {}, "-part");
   Image tables = full_cells_scene(false);
-  tables.header.quality[LSP_QUALITY_ACCURATE] = LSP_DIAL(8u, 3u);
+  tables.header.quality[LSP_QUALITY_ACCURATE] = LSP_HEEDS(8u, 3u);
   c.add(RuleId::kQualityRange, "accurate traces cells of a file without EXACT exactly", encode(tables), {},
         "-tables");
   cells(c, RuleId::kCellNumber, "the filled cell names record 1", [](Image& i) { i.cell_words[0] |= 1; });

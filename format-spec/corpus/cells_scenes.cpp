@@ -32,14 +32,15 @@ Image full_cells_scene(bool exact) {
   cell.split_count = 1;
   cell.root = LSP_CELL_NO_CHILD;
   h.quality[LSP_QUALITY_BALANCED] = h.quality[LSP_QUALITY_FAST] = h.quality[LSP_QUALITY_ACCURATE] =
-      LSP_DIAL_TABLES;
+      LSP_HEEDS_TABLES;
   // 30 shafts and 6 of the origin table: empty, planes and a split, of several losses; the last is the sky.
   image.entries.assign(18, LSP_ANSWER_EMPTY | LSP_ANSWER_EMPTY << 16);
   image.entries[0] = 0 | (1u | 2u << LSP_LOSS_SHIFT) << 16;
   image.entries[17] = (LSP_ANSWER_EMPTY | LSP_LOSS_UNKNOWN << LSP_LOSS_SHIFT) | LSP_ANSWER_SKY << 16;
   if (exact) {
-    h.quality[LSP_QUALITY_BALANCED] = LSP_DIAL(0u, 3u);
-    h.quality[LSP_QUALITY_ACCURATE] = LSP_DIAL(0u, 0u);
+    h.quality[LSP_QUALITY_BALANCED] = LSP_HEEDS(0u, 3u);
+    h.quality_part[LSP_QUALITY_BALANCED] = LSP_HEEDS(2u, 8u);
+    h.quality[LSP_QUALITY_ACCURATE] = LSP_HEEDS(0u, 0u);
     const auto leaf = [](uint32_t first, uint32_t count) {
       return LSP_CELL_LEAF_BIT | (count - 1) << LSP_CELL_LEAF_COUNT_SHIFT | first;
     };

@@ -46,7 +46,7 @@ void header(Collector& c) {
     header_of(b).file_bytes -= 16;
   });
   c.header(RuleId::kBaseStructure, "base_structure is 4", [](LspHeader& h) { h.base_structure = 4; });
-  c.header(RuleId::kReservedNotZero, "reserved_1[2] is 1", [](LspHeader& h) { h.reserved_1[2] = 1; });
+  c.header(RuleId::kReservedNotZero, "reserved_0 is 1", [](LspHeader& h) { h.reserved_0 = 1; });
   c.header(RuleId::kBoundsNotFinite, "bounds_max.x is infinite",
            [](LspHeader& h) { h.bounds_max.x = kInfinity; });
   c.header(RuleId::kTolerances, "normal_angle_cos is NaN",

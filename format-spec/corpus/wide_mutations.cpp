@@ -72,7 +72,7 @@ void header_and_table(Collector& c) {
               [](LspHeader& h) { h.max_steps = 53; });
   wide_header(c, RuleId::kWideNodes, "WIDE is set, EXACT is clear", [](LspHeader& h) {
     h.required_features &= ~LSP_FEATURE_EXACT;
-    for (uint32_t& dial : h.quality) dial = LSP_DIAL_TABLES;
+    for (uint32_t& dial : h.quality) dial = LSP_HEEDS_TABLES;
   });
   wide_header(c, RuleId::kCountDiffers, "wide_node_count is one more",
               [](LspHeader& h) { h.wide_node_count += 1; });

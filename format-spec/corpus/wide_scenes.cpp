@@ -146,7 +146,8 @@ Image wide_alone_scene() {
   h.required_features = (h.required_features & ~LSP_FEATURE_CELLS) | LSP_FEATURE_WIDE_BASE;
   h.version_minor = lsp_version_minor(h.required_features);
   h.cells = {};
-  for (uint32_t& dial : h.quality) dial = 0;
+  for (uint32_t& classes : h.quality) classes = 0;
+  for (uint32_t& part : h.quality_part) part = 0;
   return image;
 }
 

@@ -127,6 +127,22 @@ void check_cube(const LspHeader& header, Report& report) {
     LSP_HEADER_FINDING(kNtreeCube, ntree_lo, "the bounds reach outside the cube");
 }
 
+// How many classes of what answers lose a quality heeds, and which part of another.
+void check_quality(const LspHeader& header, uint32_t number, Report& report) {
+  const uint32_t whole = header.quality[number], part = header.quality_part[number];
+  const bool tables_alone = has_cells(header) && (header.required_features & LSP_FEATURE_EXACT) == 0;
+  bool good = has_cells(header) ? !tables_alone || whole == LSP_HEEDS_TABLES : (whole | part) == 0;
+  good = good && whole >> 16 == 0 && part >> 16 == 0;
+  for (const uint32_t shift : {0u, 8u}) {
+    const uint32_t classes = whole >> shift & 0xFF, more = part >> shift & 0xFF;
+    good = good && classes <= LSP_LOSS_UNKNOWN + 1 && more < LSP_DIAL_PARTS;
+    good = good && (classes <= LSP_LOSS_UNKNOWN || more == 0);
+  }
+  if (!good)
+    LSP_HEADER_FINDING(kQualityRange, quality,
+                       "quality " + std::to_string(number) + " is " + hex(whole) + ", its part " + hex(part));
+}
+
 void check_grid(const LspHeader& header, Report& report) {
   const LspCellGrid& g = header.cells;
   constexpr LspCellGrid kNone{};
@@ -151,14 +167,7 @@ void check_grid(const LspHeader& header, Report& report) {
       LSP_HEADER_FINDING(kOriginNotFinite, origin_x, "the origin is not finite");
       break;
     }
-  for (uint32_t dial : header.quality)
-    if ((dial & 0xFF) > LSP_LOSS_UNKNOWN + 1 || dial >> 8 > LSP_LOSS_UNKNOWN + 1 ||
-        (dial != 0 && !has_cells(header)) ||
-        (dial != LSP_DIAL_TABLES && has_cells(header) &&
-         (header.required_features & LSP_FEATURE_EXACT) == 0)) {
-      LSP_HEADER_FINDING(kQualityRange, quality, "is " + hex(dial));
-      break;
-    }
+  for (uint32_t q = 0; q < LSP_QUALITY_COUNT; ++q) check_quality(header, q, report);
 }
 
 void check_base(const LspHeader& header, Report& report) {
@@ -227,9 +236,8 @@ void check_numbers(const LspHeader& header, Report& report) {
   if (!(header.plane_tolerance >= 0.0f && std::isfinite(header.plane_tolerance)))
     LSP_HEADER_FINDING(kTolerances, plane_tolerance, "is " + std::to_string(header.plane_tolerance));
   bool zero = header.reserved_0 == 0;
-  for (uint32_t word : header.reserved_1) zero = zero && word == 0;
   for (uint32_t word : header.cells.reserved) zero = zero && word == 0;
-  if (!zero) LSP_HEADER_FINDING(kReservedNotZero, reserved_1, "a reserved field is not zero");
+  if (!zero) LSP_HEADER_FINDING(kReservedNotZero, reserved_0, "a reserved field is not zero");
 }
 
 void check_length(const FileView& view, Report& report) {

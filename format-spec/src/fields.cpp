@@ -78,7 +78,7 @@ struct Fields<LspHeader> {
                                    LSP_FIELD(ntree_lo),
                                    LSP_FIELD(ntree_size),
                                    LSP_FIELD(ntree_margin),
-                                   LSP_FIELD(reserved_1),
+                                   LSP_FIELD(quality_part),
                                    LSP_FIELD(cells.lo),
                                    LSP_FIELD(cells.size),
                                    LSP_FIELD(cells.cells_x),

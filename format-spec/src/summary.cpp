@@ -205,9 +205,12 @@ Json vec(const lsp_float3& v) { return Json::array({v.x, v.y, v.z}); }
 constexpr int kLossLimits[] = LSP_LOSS_LIMITS;
 
 // From which loss on, per cent, a dial has a cell traced exactly: null where it never does. 0: always.
-Json heeded_loss(uint32_t classes) {
+// Between whole classes as lsp_dial has it.
+Json heeded_loss(uint32_t classes, uint32_t part) {
   if (classes > LSP_LOSS_UNKNOWN) return nullptr;
-  return classes == 0 ? 0 : kLossLimits[classes - 1];
+  if (classes == 0) return 0;
+  const int from = kLossLimits[classes - 1], to = classes < LSP_LOSS_UNKNOWN ? kLossLimits[classes] : from;
+  return from + (to - from) * double(part) / LSP_DIAL_PARTS;
 }
 
 Json wide_nodes(const FileView& view, const std::vector<Row>& rows) {
@@ -244,8 +247,9 @@ Json cells(const FileView& view) {
                {"splits", h.split_count}};
   constexpr const char* kNames[LSP_QUALITY_COUNT] = {"balanced", "fast", "accurate"};
   for (uint32_t q = 0; q < LSP_QUALITY_COUNT; ++q)
-    json["exact_above_loss"][kNames[q]] = {{"origin", heeded_loss(h.quality[q] & 0xFF)},
-                                           {"far", heeded_loss(h.quality[q] >> 8)}};
+    json["exact_above_loss"][kNames[q]] = {
+        {"origin", heeded_loss(h.quality[q] & 0xFF, h.quality_part[q] & 0xFF)},
+        {"far", heeded_loss(h.quality[q] >> 8, h.quality_part[q] >> 8)}};
   // How many entries lose so much: by class, of the two tables.
   std::array<std::array<uint64_t, LSP_LOSS_UNKNOWN + 1>, 2> counts{};
   uint64_t entry = 0;

@@ -14,15 +14,20 @@
 extern "C" uint32_t lsp_dial(const lsp_scene* scene, const lsp_trace_options* options) {
   // Without their triangles cells answer from tables alone.
   if (scene->cell_references == nullptr) return LSP_DIAL_TABLES;
-  if ((options->flags & LSP_TRACE_MAX_LOSS) == 0)
-    return scene->header
-        ->quality[options->quality < LSP_QUALITY_COUNT ? options->quality : LSP_QUALITY_BALANCED];
+  if ((options->flags & LSP_TRACE_MAX_LOSS) == 0) {
+    const LspHeader& h = *scene->header;
+    const uint32_t q = options->quality < LSP_QUALITY_COUNT ? options->quality : LSP_QUALITY_BALANCED;
+    return LSP_DIAL(h.quality[q], h.quality_part[q]);
+  }
   if (options->max_loss >= 100) return LSP_DIAL_TABLES;
-  if (!(options->max_loss > 0)) return LSP_DIAL(0u, 0u);
+  if (!(options->max_loss > 0)) return 0;
+  // So many whole classes, and of the next one as large a part as max_loss is between their limits.
   uint32_t classes = 0;
   constexpr int kLimits[LSP_LOSS_UNKNOWN] = LSP_LOSS_LIMITS;
-  for (const int limit : kLimits) classes += options->max_loss >= static_cast<float>(limit) ? 1 : 0;
-  return LSP_DIAL(classes, classes);
+  while (classes < LSP_LOSS_UNKNOWN && options->max_loss >= static_cast<float>(kLimits[classes])) ++classes;
+  const auto from = static_cast<float>(kLimits[classes - 1]), to = static_cast<float>(kLimits[classes]);
+  const auto part = static_cast<uint32_t>((options->max_loss - from) / (to - from) * float{LSP_DIAL_PARTS});
+  return LSP_HEEDS(classes, classes) * LSP_DIAL_PARTS + LSP_HEEDS(part, part);
 }
 
 extern "C" void lsp_add_counts(lsp_trace_counts* sum, const lsp_trace_counts* more) {

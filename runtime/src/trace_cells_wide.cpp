@@ -479,8 +479,10 @@ struct Tracer : Rays<kPool> {
     said =
         select(as_uint(mask_of(unknown >> i)), hn::Or(said, set_u(LSP_LOSS_UNKNOWN << LSP_LOSS_SHIFT)), said);
     const VU number = hn::ShiftRight<LSP_LOSS_SHIFT>(said);
+    const VU table = select(as_uint(begins), set_u(LSP_RISK_ORIGIN), set_u(LSP_RISK_FAR));
+    const VU counts = hn::And(hn::Shr(table, hn::ShiftLeft<2>(number)), set_u(15));
     const VF classes = select(as_float(hn::Eq(number, set_u(LSP_LOSS_UNKNOWN))), set(LSP_RISK_UNKNOWN),
-                              hn::ConvertTo(df, hn::BitCast(di, number)));
+                              hn::Sub(hn::ConvertTo(df, hn::BitCast(di, counts)), set(7)));
     const VF all = set(-INFINITY);
     const VF limit = select(as_float(hn::Eq(load(mode_ + i), set_u(LSP_WALK_AGAIN))), all,
                             select(begins, set(heeded_of(dial & 0xFFu)), set(heeded_of(dial >> 8u))));
@@ -516,8 +518,10 @@ struct Tracer : Rays<kPool> {
   }
 
   // From which class on a cell is traced exactly: lsp_is_lossy.
-  static float heeded_of(uint32_t classes) {
-    return classes == 0 ? -INFINITY : classes > LSP_LOSS_UNKNOWN ? INFINITY : static_cast<float>(classes);
+  static float heeded_of(uint32_t parts) {
+    if (parts == 0) return -INFINITY;
+    if (parts >= LSP_DIAL_PARTS * (LSP_LOSS_UNKNOWN + 1)) return INFINITY;
+    return static_cast<float>(parts) / float{LSP_DIAL_PARTS};
   }
   HWY_INLINE MF is_lossy(size_t i, VF more) const {
     return hn::Ge(hn::Add(load(loss + i), more), load(heeded + i));

@@ -272,7 +272,8 @@ TEST(Loading, WhatIsNotLoadedIsRefusedOrNotCompiledIn) {
   };
   // The dial is open where the cells' exact data is there, else it is that of tables alone.
   ASSERT_EQ(ask(LSP_USE_APPROXIMATE, by_tables(LSP_QUALITY_BALANCED)), LSP_OK) << error.message;
-  EXPECT_EQ(kind.dial, scene.header->quality[LSP_QUALITY_BALANCED]);
+  EXPECT_EQ(kind.dial, LSP_DIAL(scene.header->quality[LSP_QUALITY_BALANCED],
+                                scene.header->quality_part[LSP_QUALITY_BALANCED]));
   EXPECT_NE(kind.parts & LSP_PART_CELL_EXACT, 0u);
   EXPECT_EQ(kind.base_structure, uint32_t(LSP_BASE_CELLS));
   ASSERT_EQ(ask(LSP_USE_TABLES | LSP_USE_EXACT, by_tables(LSP_QUALITY_BALANCED)), LSP_OK) << error.message;

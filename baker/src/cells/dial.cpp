@@ -92,6 +92,15 @@ double open_share(const LspHit* hits, double radius) {
   return double(open) / kPerPoint;
 }
 
+uint32_t dial_of(const LspHeader& h, uint32_t quality) {
+  return LSP_DIAL(h.quality[quality], h.quality_part[quality]);
+}
+
+void set_dial(LspHeader& h, uint32_t quality, uint32_t dial) {
+  h.quality[quality] = dial / LSP_DIAL_PARTS & LSP_HEEDS(0xFu, 0xFu);
+  h.quality_part[quality] = dial & LSP_HEEDS(0xFu, 0xFu);
+}
+
 // Sums over points of what is true and of how far off the answer is.
 struct Measured {
   double truth = 0, off = 0;
@@ -158,11 +167,15 @@ class Dial {
   // one is counted, which traces least exactly.
   uint32_t cheapest(double wrong, uint32_t most) {
     // What nobody knows is never heeded: rays of other places than these may come there.
-    constexpr uint32_t kClasses[] = {0, 1, 2, 3, 4, 5, 6, LSP_LOSS_UNKNOWN};
-    uint32_t best = LSP_DIAL(0u, 0u);
+    constexpr auto kSteps = [] {
+      std::array<uint32_t, 2 * (LSP_LOSS_UNKNOWN + 1)> steps{};  // half classes
+      for (uint32_t i = 0; i < steps.size(); ++i) steps[i] = i * LSP_DIAL_PARTS / 2;
+      return steps;
+    }();
+    uint32_t best = 0;
     double least = INFINITY;
     const auto weigh = [&](uint32_t dial) {
-      header_.quality[LSP_QUALITY_BALANCED] = dial;
+      set_dial(header_, LSP_QUALITY_BALANCED, dial);
       double cost = 0;
       for (Rays& set : sets_) cost += kVulkan.cells(counted(set, LSP_QUALITY_BALANCED));
       if (cost < least) {
@@ -172,10 +185,10 @@ class Dial {
     };
     constexpr uint32_t kNone = UINT32_MAX;
     uint32_t kept = kNone;
-    const size_t nears = heeded(kClasses, most & 0xFFu);
-    for (size_t near = 0, far = heeded(kClasses, most >> 8u); near < nears && far > 0;) {
-      const uint32_t dial = LSP_DIAL(kClasses[near], kClasses[far - 1]);
-      header_.quality[LSP_QUALITY_BALANCED] = dial;
+    const size_t nears = heeded(kSteps, most & 0xFFu);
+    for (size_t near = 0, far = heeded(kSteps, most >> 8u); near < nears && far > 0;) {
+      const uint32_t dial = LSP_HEEDS(kSteps[near], kSteps[far - 1]);
+      set_dial(header_, LSP_QUALITY_BALANCED, dial);
       if (keeps(wrong)) {
         kept = dial;
         ++near;
@@ -201,7 +214,7 @@ class Dial {
       }
     return true;
   }
-  // How many of these classes, which ascend, are no more than `most`.
+  // How many of these steps, which ascend, are no more than `most`.
   static size_t heeded(std::span<const uint32_t> classes, uint32_t most) {
     return size_t(std::upper_bound(classes.begin(), classes.end(), most) - classes.begin());
   }
@@ -253,13 +266,13 @@ class Dial {
 
   // The searches for two qualities, and their figures, ask for the same dials.
   const DialError& measured(Rays& set, uint32_t quality) const {
-    const auto [known, added] = set.measured.try_emplace(header_.quality[quality]);
+    const auto [known, added] = set.measured.try_emplace(dial_of(header_, quality));
     if (added) known->second = measure(set, quality);
     return known->second;
   }
 
   const lsp_trace_counts& counted(Rays& set, uint32_t quality) const {
-    const auto [known, added] = set.counted.try_emplace(header_.quality[quality]);
+    const auto [known, added] = set.counted.try_emplace(dial_of(header_, quality));
     if (added) trace(scene_, options_of(quality), set.counted_rays, &known->second);
     return known->second;
   }
@@ -312,13 +325,14 @@ class Dial {
 void choose_dial(Baked& baked, double wrong) {
   LspHeader& h = baked.header;
   baked.qualities = {};
-  for (uint32_t& dial : h.quality) dial = LSP_DIAL_TABLES;
+  for (uint32_t quality = 0; quality < LSP_QUALITY_COUNT; ++quality) set_dial(h, quality, LSP_DIAL_TABLES);
   if (baked.cell_tables.references.empty()) return;
   Dial dial(baked);
   const uint32_t balanced = dial.cheapest(wrong, LSP_DIAL_TABLES);
   // Whatever this heeds balanced does, too, or it might err more in pictures that nobody measured.
-  h.quality[LSP_QUALITY_ACCURATE] = dial.cheapest(0.5 * wrong, balanced);
-  h.quality[LSP_QUALITY_BALANCED] = balanced;
+  const uint32_t accurate = dial.cheapest(0.5 * wrong, balanced);
+  set_dial(h, LSP_QUALITY_BALANCED, balanced);
+  set_dial(h, LSP_QUALITY_ACCURATE, accurate);
   for (uint32_t quality = 0; quality < LSP_QUALITY_COUNT; ++quality)
     baked.qualities[quality] = dial.figures(quality);
 }

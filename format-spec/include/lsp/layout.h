@@ -180,7 +180,7 @@ LSP_BEGIN(LspHeader)
   LSP_VEC3 ntree_lo;        /* lower corner of the root's cube */
   LSP_FLOAT ntree_size;     /* its edge */
   LSP_FLOAT ntree_margin;   /* a cell also holds what comes within this distance of it */
-  LSP_UINT reserved_1[3];   /* zero */
+  LSP_UINT quality_part[3]; /* what LSP_DIAL adds to quality; of other files, and before 2.6, zero */
   LspCellGrid cells;
   LSP_U64 origin_x; /* float64: what positions of the file, of rays and of hits are relative to */
   LSP_U64 origin_y;
@@ -191,7 +191,7 @@ LSP_BEGIN(LspHeader)
   LSP_UINT split_count;
   LSP_UINT cell_node_count;      /* LspCellNode */
   LSP_UINT cell_reference_count; /* of CREF */
-  LSP_UINT quality[3]; /* LSP_QUALITY_*: LSP_DIAL of how many classes are heeded of what answers lose */
+  LSP_UINT quality[3]; /* LSP_QUALITY_*: LSP_HEEDS of whole classes */
   LSP_UINT wide_node_count; /* LspWideNode */
 LSP_END(LspHeader)
 
@@ -200,10 +200,14 @@ LSP_END(LspHeader)
 #define LSP_QUALITY_FAST 1u
 #define LSP_QUALITY_ACCURATE 2u
 #define LSP_QUALITY_COUNT 3u
-/* Of origin and of far tables the entries of so many classes of loss are heeded, the lowest ones; where others would
- * answer, the cell is traced exactly. */
-#define LSP_DIAL(origin_classes, far_classes) ((origin_classes) | (far_classes) << 8u)
-#define LSP_DIAL_TABLES LSP_DIAL(LSP_LOSS_UNKNOWN + 1u, LSP_LOSS_UNKNOWN + 1u) /* nothing is traced exactly */
+/* In the cell that a ray begins in, and in others, answers are heeded that lose less than so many classes; where another
+ * would answer, the cell is traced exactly. */
+#define LSP_HEEDS(origin_classes, far_classes) ((origin_classes) | (far_classes) << 8u)
+#define LSP_HEEDS_TABLES LSP_HEEDS(LSP_LOSS_UNKNOWN + 1u, LSP_LOSS_UNKNOWN + 1u) /* nothing is traced exactly */
+/* The same in sixteenths of a class, as tracers take it, of header.quality and header.quality_part. */
+#define LSP_DIAL_PARTS 16u
+#define LSP_DIAL(quality, part) ((quality) << 4u | (part))
+#define LSP_DIAL_TABLES LSP_DIAL(LSP_HEEDS_TABLES, 0u)
 
 LSP_BEGIN(LspSection)
   LSP_UINT type;  /* LSP_SECTION_* */

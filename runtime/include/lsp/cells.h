@@ -6,11 +6,11 @@
  * the origin table of its sub-cell, in others the far table, which is the paper's Line Space (section 3.1). An entry
  * is empty, a plane, or a split: two answers, and a linear form over the ray's place in the shaft whose sign chooses.
  * An answer that loses more than asked for is not heeded: the ray is traced exactly through this cell, in the cell's
- * own small tree, and goes on from there. What an answer loses is what its entry does, in classes (LSP_LOSS_LIMITS),
- * and as many classes more or fewer as the ray's place says (lsp_split_risk, lsp_cell_meet). Where any hit will do such cells wait: what a table is sure of, however far,
- * ends the ray without them, and only where none is the ray goes back to them. A ray that misses everything, but
- * leaves the cell it begins in by a way on which the bake found no sky (LspFilledCell.closed), begins again, and every
- * cell is traced exactly.
+ * own small tree, and goes on from there. What an answer loses is what the bake saw its entry lose, and more or less as
+ * the ray's place says: near the border of a split, beyond the cell, or where the ray has just begun. Where any hit
+ * will do such cells wait: what a table is sure of, however far, ends the ray without them, and only where none is the
+ * ray goes back to them. A ray that misses everything, but leaves the cell it begins in by a way on which the bake
+ * found no sky (LspFilledCell.closed), begins again, and every cell is traced exactly.
  *
  * runtime/src/trace_cells_wide.cpp and wide_calls-inl.h state this a second time for rays in vector lanes, operation by
  * operation: what changes here changes there.
@@ -200,9 +200,12 @@ LSP_FN float lsp_split_side(LspSplit split, vec4 place, float place_4) {
   return side;
 }
 
-/* By how many classes the ray's place says that an answer loses more than its entry does, in steps that are exact in
- * single precision. The figures are fitted to half a million passages of cells of five scenes, one class being a
- * factor of about 1.4 in what was lost. */
+/* What an answer loses, in classes: what that of its entry counts for, and more or less as the ray's place says. A class
+ * is a factor of about 1.4 in what was lost by 800,000 passages through cells of five scenes, to which all of this is
+ * fitted. What is multiplied here is exact in single precision. */
+/* Classes of entries, four bits each: what they count for, and 7. */
+#define LSP_RISK_ORIGIN 0x0DCBAA96u
+#define LSP_RISK_FAR 0x0ECA9880u
 #define LSP_RISK_UNKNOWN 64.0f                               /* in place of a class: more than a place takes from it */
 #define LSP_RISK_NO_SPLIT(begins) ((begins) ? -2.0f : 1.0f) /* an entry that is empty or knows the sky */
 
@@ -257,10 +260,12 @@ LSP_FN LspCellMeeting lsp_cell_meet(LspPlane plane, vec3 origin, vec3 direction,
   return meeting;
 }
 
-/* Whether a cell is to be traced exactly where the dial heeds so many classes: LSP_DIAL. */
-LSP_FN bool lsp_is_lossy(uint loss, float risk, uint heeded) {
-  float classes = (loss == LSP_LOSS_UNKNOWN ? LSP_RISK_UNKNOWN : float(loss)) + risk;
-  return heeded == 0u || (heeded <= LSP_LOSS_UNKNOWN && classes >= float(heeded));
+/* Whether a cell is to be traced exactly where so many sixteenths of a class are heeded: LSP_DIAL. */
+LSP_FN bool lsp_is_lossy(uint loss, float risk, bool begins, uint heeded) {
+  uint counts = ((begins ? LSP_RISK_ORIGIN : LSP_RISK_FAR) >> (4u * loss)) & 15u;
+  float classes = (loss == LSP_LOSS_UNKNOWN ? LSP_RISK_UNKNOWN : float(counts) - 7.0f) + risk;
+  return heeded == 0u || (heeded < LSP_DIAL_PARTS * (LSP_LOSS_UNKNOWN + 1u) &&
+                          classes >= float(heeded) * (1.0f / float(LSP_DIAL_PARTS)));
 }
 
 LSP_FN int lsp_cell_within(float p, int cell, int jump) {
@@ -317,7 +322,7 @@ LSP_STEP bool lsp_cell_answer(LspScene scene, LspSetup s, LspQuery q, LspCellRay
       risk += meeting.risk;
     }
   }
-  exactly = (LSP_PARTS & LSP_PART_CELL_EXACT) != 0u && (exactly || lsp_is_lossy(entry >> LSP_LOSS_SHIFT, risk, heeded));
+  exactly = (LSP_PARTS & LSP_PART_CELL_EXACT) != 0u && (exactly || lsp_is_lossy(entry >> LSP_LOSS_SHIFT, risk, begins, heeded));
   bool over = answer == LSP_ANSWER_SKY && !lsp_walk.closed;
   if (!exactly && hit > s.tmin && hit < s.tmax) {
     over = true;

@@ -137,7 +137,9 @@ bool lsp_occluded(LspScene scene, LspRay ray, uint flags, float lod, uint dial) 
 
 /* With cells: balanced. */
 LspHit lsp_trace(LspScene scene, LspRay ray, uint flags, float lod) {
-  return lsp_trace(scene, ray, flags, lod, lsp_load_header(scene).quality[LSP_QUALITY_BALANCED]);
+  LspHeader header = lsp_load_header(scene);
+  return lsp_trace(scene, ray, flags, lod,
+                   LSP_DIAL(header.quality[LSP_QUALITY_BALANCED], header.quality_part[LSP_QUALITY_BALANCED]));
 }
 
 #endif

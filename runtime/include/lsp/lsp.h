@@ -125,8 +125,8 @@ typedef struct lsp_trace_options {
   float lod;      /* theta, finite, from 0 on: stop at a Line Space once its box's diagonal is under lod *
                      distance; 0: deepest only */
   uint32_t quality LSP_DEFAULT(0); /* of cells: LSP_QUALITY_*, 0: balanced */
-  float max_loss LSP_DEFAULT(0);   /* with LSP_TRACE_MAX_LOSS: where entries of cells lose more, in per cent,
-                       the cell is traced exactly: 0, no entry is heeded, to 100, tables alone */
+  float max_loss LSP_DEFAULT(0);   /* with LSP_TRACE_MAX_LOSS: where answers of cells lose more, about, in per
+                       cent, the cell is traced exactly: 0, none is heeded, to 100, tables alone */
 } lsp_trace_options;
 #undef LSP_DEFAULT
 

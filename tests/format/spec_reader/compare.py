@@ -69,7 +69,7 @@ def main(spec, programs):
                 return np.fromfile(Path(folder) / "hits.bin", HITS), json.loads(report)
             good &= compare(f"{scene}, exact", [trace_wide(f, r) for r in rays], theirs("--mode", "exact")[0])
             for i, quality in enumerate(("balanced", "fast", "accurate")):
-                cells = Cells(f, f.h["quality"][i])
+                cells = Cells(f, f.h["quality"][i], f.h["quality_part"][i])
                 hits, report = theirs("--mode", "approximate", "--quality", quality)
                 good &= compare(f"{scene}, {quality}", [cells.trace(r) for r in rays], hits)
                 steps = abs(cells.steps / kRays - report["steps_per_ray"])

@@ -137,9 +137,9 @@ def trace_tree(f, cell, corner, ray, t_in, t_out):
 class Cells:
     """Rays through the tables of a file of cells (6a) by a quality of the header."""
 
-    def __init__(self, f, dial):
-        self.f, self.heeded = f, (int(dial) & 255, int(dial) >> 8 & 255)
-        self.tables_alone = self.heeded == (8, 8)
+    def __init__(self, f, quality, part):
+        self.f, self.heeded = f, [(int(quality) >> at & 255) + (int(part) >> at & 255) / 16 for at in (0, 8)]
+        self.tables_alone = self.heeded == [8, 8]
         self.size, self.entries = float(f.h["cells.size"]), f["CENT"].view("<u2")
         self.count = np.array([int(f.h["cells.cells_" + a]) for a in "xyz"])
         self.n, self.m, self.sub = (int(f.h["cells." + x]) for x in ("far_patches", "origin_patches", "sub_cells"))
@@ -208,7 +208,8 @@ class Cells:
         heeded = self.heeded[0 if begins else 1]
 
         def lossy(place):
-            return again or heeded == 0 or heeded < 8 and (loss == 7 or loss + place >= heeded)
+            counts = (-1, 2, 3, 3, 4, 5, 6, 99) if begins else (-7, 1, 1, 2, 3, 5, 7, 99)
+            return again or heeded == 0 or heeded < 8 and counts[loss] + place >= heeded
 
         def exactly():
             hit = trace_tree(f, cell, corner, ray, t_in, t_out)

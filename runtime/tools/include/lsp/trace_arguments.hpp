@@ -37,7 +37,7 @@ inline void add_trace_arguments(CLI::App& app, TraceArguments& a) {
       ->check(CLI::IsMember({"fast", "balanced", "accurate"}));
   app.add_option(
          "--max-loss", a.max_loss,
-         "Approximate, cells: trace exactly where entries lose more, in per cent; 100: tables alone, 0: "
+         "Approximate, cells: trace exactly where answers lose more, in per cent; 100: tables alone, 0: "
          "every cell exactly (default: as --quality says)")
       ->check(CLI::Range(0.0f, 100.0f));
 }
