@@ -118,6 +118,34 @@ TEST(Interface, SuccessClearsTheError) {
   }
 }
 
+// A quality's dial is the file's, in sixteenths of a class; a loss between two limits is between two classes.
+TEST(Interface, DialCountsInParts) {
+  LspHeader header{};
+  header.quality[LSP_QUALITY_BALANCED] = LSP_HEEDS(3u, 5u);
+  header.quality_part[LSP_QUALITY_BALANCED] = LSP_HEEDS(8u, 15u);
+  header.quality[LSP_QUALITY_FAST] = LSP_HEEDS_TABLES;
+  const uint32_t reference = 0;
+  lsp_scene scene = {};
+  scene.header = &header;
+  lsp_trace_options options = {};
+  options.flags = LSP_TRACE_APPROXIMATE;
+  EXPECT_EQ(lsp_dial(&scene, &options), uint32_t{LSP_DIAL_TABLES}) << "no exact data";
+  scene.cell_references = &reference;
+  EXPECT_EQ(lsp_dial(&scene, &options), (3u * 16 + 8) | (5u * 16 + 15) << 8);
+  options.quality = LSP_QUALITY_FAST;
+  EXPECT_EQ(lsp_dial(&scene, &options), uint32_t{LSP_DIAL_TABLES});
+
+  options.flags |= LSP_TRACE_MAX_LOSS;
+  const std::pair<float, uint32_t> dials[] = {{0.0f, 0},   {0.5f, 24},  {1.0f, 32},   {2.0f, 48},  {3.5f, 56},
+                                              {10.0f, 80}, {20.0f, 96}, {60.0f, 104}, {99.9f, 111}};
+  for (const auto& [loss, parts] : dials) {
+    options.max_loss = loss;
+    EXPECT_EQ(lsp_dial(&scene, &options), LSP_HEEDS(parts, parts)) << loss;
+  }
+  options.max_loss = 100;
+  EXPECT_EQ(lsp_dial(&scene, &options), uint32_t{LSP_DIAL_TABLES});
+}
+
 TEST(Interface, OffsetIsLargerWhereATableAnswered) {
   LspHeader header = {};
   header.bounds_max = {3, 4, 12};

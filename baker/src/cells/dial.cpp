@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <span>
 
 #include "../surface_rays.h"
 #include "../vectors.h"
@@ -161,45 +160,23 @@ class Dial {
     return out;
   }
 
-  // The dial that is cheapest over all rays of those that keep within errors, or the finest, and that heed no
-  // more of either table than `most`. The more of the origin tables is heeded, the less of the far tables can
-  // be: a walk along the border of what is within. Of those that heed as much of the far tables only the last
-  // one is counted, which traces least exactly.
-  uint32_t cheapest(double wrong, uint32_t most) {
+  // The dial that traces least exactly of those that keep within errors, no more than `most`, or 0. Answers
+  // where rays begin and in other cells lose classes of one kind, and so many are heeded of both: the best
+  // pair for these rays was a worse one for others.
+  uint32_t farthest(double wrong, uint32_t most) {
     // What nobody knows is never heeded: rays of other places than these may come there.
-    constexpr auto kSteps = [] {
-      std::array<uint32_t, 2 * (LSP_LOSS_UNKNOWN + 1)> steps{};  // half classes
-      for (uint32_t i = 0; i < steps.size(); ++i) steps[i] = i * LSP_DIAL_PARTS / 2;
-      return steps;
-    }();
-    uint32_t best = 0;
-    double least = INFINITY;
-    const auto weigh = [&](uint32_t dial) {
-      set_dial(header_, LSP_QUALITY_BALANCED, dial);
-      double cost = 0;
-      for (Rays& set : sets_) cost += kVulkan.cells(counted(set, LSP_QUALITY_BALANCED));
-      if (cost < least) {
-        least = cost;
-        best = dial;
-      }
+    constexpr uint32_t kStep = LSP_DIAL_PARTS / 4, kLast = LSP_DIAL_PARTS * (LSP_LOSS_UNKNOWN + 1) - kStep;
+    const auto dial = [](uint32_t steps) { return LSP_HEEDS(steps * kStep, steps * kStep); };
+    const auto keeps_at = [&](uint32_t steps) {
+      set_dial(header_, LSP_QUALITY_BALANCED, dial(steps));
+      return keeps(wrong);
     };
-    constexpr uint32_t kNone = UINT32_MAX;
-    uint32_t kept = kNone;
-    const size_t nears = heeded(kSteps, most & 0xFFu);
-    for (size_t near = 0, far = heeded(kSteps, most >> 8u); near < nears && far > 0;) {
-      const uint32_t dial = LSP_HEEDS(kSteps[near], kSteps[far - 1]);
-      set_dial(header_, LSP_QUALITY_BALANCED, dial);
-      if (keeps(wrong)) {
-        kept = dial;
-        ++near;
-        continue;
-      }
-      if (kept != kNone) weigh(kept);
-      kept = kNone;
-      --far;
+    uint32_t kept = 0, lost = std::min(most & 0xFFu, kLast) / kStep + 1;
+    while (lost - kept > 1) {
+      const uint32_t middle = (kept + lost) / 2;
+      (keeps_at(middle) ? kept : lost) = middle;
     }
-    if (kept != kNone) weigh(kept);
-    return best;
+    return dial(kept);
   }
 
  private:
@@ -213,10 +190,6 @@ class Dial {
         return false;
       }
     return true;
-  }
-  // How many of these steps, which ascend, are no more than `most`.
-  static size_t heeded(std::span<const uint32_t> classes, uint32_t most) {
-    return size_t(std::upper_bound(classes.begin(), classes.end(), most) - classes.begin());
   }
   static double diagonal(const LspHeader& h) {
     return glm::length(glm::dvec3(h.bounds_max.x, h.bounds_max.y, h.bounds_max.z) -
@@ -328,9 +301,9 @@ void choose_dial(Baked& baked, double wrong) {
   for (uint32_t quality = 0; quality < LSP_QUALITY_COUNT; ++quality) set_dial(h, quality, LSP_DIAL_TABLES);
   if (baked.cell_tables.references.empty()) return;
   Dial dial(baked);
-  const uint32_t balanced = dial.cheapest(wrong, LSP_DIAL_TABLES);
+  const uint32_t balanced = dial.farthest(wrong, LSP_DIAL_TABLES);
   // Whatever this heeds balanced does, too, or it might err more in pictures that nobody measured.
-  const uint32_t accurate = dial.cheapest(0.5 * wrong, balanced);
+  const uint32_t accurate = dial.farthest(0.5 * wrong, balanced);
   set_dial(h, LSP_QUALITY_BALANCED, balanced);
   set_dial(h, LSP_QUALITY_ACCURATE, accurate);
   for (uint32_t quality = 0; quality < LSP_QUALITY_COUNT; ++quality)
