@@ -360,7 +360,8 @@ TEST(Coverage, ApproximateRaysErrNoMoreThanInASolidScene) {
       const lsp::Baked baked = bake_kind(mesh, kind, {6});
       const std::vector<LspRay> rays = surface_rays(baked, 20000, 1);
       const auto truth = trace(view(baked), {0, 0}, rays);
-      const auto hits = trace(view(baked), {LSP_TRACE_APPROXIMATE, 0}, rays);
+      // At one dial: what balanced is, the bake finds for each scene by itself.
+      const auto hits = trace(view(baked), {LSP_TRACE_APPROXIMATE | LSP_TRACE_MAX_LOSS, 0, 0, 5}, rays);
       size_t count = 0;
       for (size_t i = 0; i < rays.size(); ++i)
         count += (hits[i].primitive == LSP_NONE) != (truth[i].primitive == LSP_NONE);
