@@ -27,7 +27,7 @@ extern "C" uint32_t lsp_dial(const lsp_scene* scene, const lsp_trace_options* op
   while (classes < LSP_LOSS_UNKNOWN && options->max_loss >= static_cast<float>(kLimits[classes])) ++classes;
   const auto from = static_cast<float>(kLimits[classes - 1]), to = static_cast<float>(kLimits[classes]);
   const auto part = static_cast<uint32_t>((options->max_loss - from) / (to - from) * float{LSP_DIAL_PARTS});
-  return LSP_HEEDS(classes, classes) * LSP_DIAL_PARTS + LSP_HEEDS(part, part);
+  return LSP_DIAL(LSP_HEEDS(classes, classes), LSP_HEEDS(part, part));
 }
 
 extern "C" void lsp_add_counts(lsp_trace_counts* sum, const lsp_trace_counts* more) {
